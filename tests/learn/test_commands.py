@@ -90,6 +90,24 @@ def test_a_training_that_does_not_fit_ends_in_one_line(tmp_path, capsys, monkeyp
     assert "8 worlds" in line and "--worlds 4" in line
 
 
+def test_processes_join_before_jax_looks_for_devices(monkeypatch, capsys):
+    """`jax.distributed` cannot be initialized once there is a backend."""
+    import jax
+
+    from ig2mj.cluster.team import Team
+    from ig2mj.errors import Ig2mjError
+
+    asked = []
+
+    def join(topology):
+        raise Ig2mjError(f"joined after {len(asked)} questions")
+
+    monkeypatch.setattr(jax, "default_backend", lambda: asked.append(1) or "cpu")
+    monkeypatch.setattr(Team, "join", join)
+    assert call(["train", "CookingMeat", "--config", "CookingMeat"]) == 2
+    assert "joined after 0 questions" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_training_leaves_reports_checkpoints_a_policy_and_films(tmp_path, capsys):

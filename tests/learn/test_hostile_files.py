@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import pathlib
 import re
@@ -17,6 +18,7 @@ from ig2mj.errors import InputError
 from ig2mj.learn.demos import about, load_demos
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy
+from ig2mj.learn.shipped import CHECKOUT
 
 
 @pytest.fixture
@@ -139,3 +141,12 @@ def changed_policy(folder: pathlib.Path, name: str, change) -> pathlib.Path:
         arrays = dict(archive)
     np.savez(file, **(arrays | {name: change(arrays[name])}))
     return file
+
+
+@pytest.mark.parametrize("net", [{"net": "places"}, {"net": "paper"}, {"net": "glimpses", "objects": 0}])
+def test_a_policy_with_an_encoder_of_version_0_1_names_the_version_that_reads_it(net, tmp_path):
+    policy = Policy.load(CHECKOUT / "CookingMeat.npz")
+    card = {**policy.card, "net": {**policy.card["net"], **net}}
+    dataclasses.replace(policy, card=card).save(tmp_path / "old.npz")
+    with pytest.raises(InputError, match=r"ig2mj 0\.1\.0 reads it"):
+        Policy.load(tmp_path / "old.npz")

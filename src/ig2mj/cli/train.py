@@ -10,8 +10,6 @@ import tyro
 from ig2mj.cli.common.deprecated import renamed_options
 
 if TYPE_CHECKING:
-    from ig2mj.learn.algorithms import Config
-    from ig2mj.learn.occlusion import OcclusionConfig
     from ig2mj.learn.run_config import RunOptions, RunSettings
 
 WORLDS = {"native": 32}
@@ -83,8 +81,7 @@ def run(
       videos: minutes between two videos of a held-out episode, written to the run's folder videos; default: none. A
         process of low priority makes them; they need OpenGL and ffmpeg.
     """
-    import jax
-
+    from ig2mj.learn.algorithms import check_settings
     from ig2mj.learn.run_config import RunOptions, read_run_file, settings_of
 
     options, settings = read_run_file(config) if config is not None else ({}, ())
@@ -92,25 +89,19 @@ def run(
     given |= {"worlds": worlds, "minutes": minutes, "seed": seed, "devices": devices, "init_from": init_from}
     given |= {"demos": demos and str(demos), "stop_at_success": stop_at_success, "videos": videos}
     chosen = RunOptions(**{**options, **{name: value for name, value in given.items() if value is not None}})
-    on_gpu = jax.default_backend() == "gpu"
-    found = settings_of(chosen.algo, (*settings, *set), on_gpu)
-    _check(chosen, found[0], out)
+    changes = (*settings, *set)
+    found, config_of_algorithm, occlusion = settings_of(chosen.algo, changes)
+    _check(chosen, found, out)
     if chosen.algo == "bc":
         from ig2mj.cli.clone import train_from_demos
 
-        return train_from_demos(chosen, out, resume, *found[:2])
-    return _train(chosen, out, resume, *found)
+        return train_from_demos(chosen, out, resume, found, config_of_algorithm)
+    check_settings(config_of_algorithm, occlusion)
+    return _train(chosen, out, resume, changes)
 
 
-def _train(
-    chosen: RunOptions,
-    out: pathlib.Path | None,
-    resume: bool,
-    settings: RunSettings,
-    config: Config,
-    occlusion: OcclusionConfig,
-) -> int:
-    """Trains in an environment. `config`: of the algorithm. Returns the exit status."""
+def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: tuple[str, ...]) -> int:
+    """Trains in an environment. `changes`: settings as "name=value". Returns the exit status."""
     import dataclasses
     import os
     import platform
@@ -124,7 +115,7 @@ def _train(
     from ig2mj.cluster.team import Team
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.errors import Ig2mjError
-    from ig2mj.learn.algorithms import check_settings, make_algorithm
+    from ig2mj.learn.algorithms import make_algorithm
     from ig2mj.learn.bc import begin_as_clone
     from ig2mj.learn.best import COUNTED, SUCCESS, Best
     from ig2mj.learn.checkpoints import Checkpoints
@@ -134,13 +125,13 @@ def _train(
     from ig2mj.learn.occlusion.encoder_pretraining import pretrain
     from ig2mj.learn.perception import Perception, depth_range_of
     from ig2mj.learn.policies import Policy, depends_on, world_of
+    from ig2mj.learn.run_config import settings_of
     from ig2mj.learn.shipped import find_policy
     from ig2mj.learn.train import Run, train
     from ig2mj.learn.warm_start import init_from_policy
     from ig2mj.process import keep_scratch_in_place
     from ig2mj.sensors.base import SensorOptions
 
-    check_settings(config, occlusion)
     algo, obs, seed, devices = chosen.algo, chosen.obs, chosen.seed, chosen.devices
     former = None if chosen.init_from is None else find_policy(chosen.init_from)
     topology = find_topology(os.environ)
@@ -148,6 +139,8 @@ def _train(
         keep_scratch_in_place()
     team = Team.join(topology)
     with team.together():
+        # JAX's backend must not be asked for before the processes have joined
+        settings, config, occlusion = settings_of(algo, changes, on_gpu=jax.default_backend() == "gpu")
         engine = settings.engine
         count = chosen.worlds or WORLDS.get(engine, PURE_WORLDS)
         shared = _devices(devices, team.count)

@@ -1,4 +1,4 @@
-"""TrainingVideos of a policy while it is trained (`ig2mj train --videos`): `ig2mj rollout` in a process of its own."""
+"""Videos of a policy while it is trained (`ig2mj train --videos`): `ig2mj rollout` in a process of its own."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LONGEST = 300.0
 
 
 class TrainingVideos:
-    """TrainingVideos of one held-out episode, the same start state each time, on the native engine of the processor.
+    """Videos of one held-out episode, the same start state each time, on the native engine of the processor.
 
     One at a time: while a video is being made, no other is started. Errors are in the video's log; training continues.
     """
@@ -33,10 +33,10 @@ class TrainingVideos:
         self._next, self._process = every, None
 
     @classmethod
-    def of(cls, env: Environment, run: pathlib.Path, every: float, paper_rl: bool) -> TrainingVideos:
+    def of(cls, env: Environment, run: pathlib.Path, every: float, relaxed_thresholds: bool) -> TrainingVideos:
         """Of an environment in which a policy is trained; none where `every` is 0."""
         chosen = [env.task.name, "--robot", env.robot, "--grasping", env.grasping]
-        return cls(run, every, chosen + ["--paper-rl"] * paper_rl)
+        return cls(run, every, chosen + ["--relaxed-thresholds"] * relaxed_thresholds)
 
     def offer(self, policy: pathlib.Path, seconds: float, last: bool = False) -> None:
         """Starts a video of this policy file, if it is time for one; `last`: in any case, and waits for it."""

@@ -53,18 +53,14 @@ def init_from_policy(algorithm: Any, policy: Policy, seed: int, file: object = "
     if hidden:
         unseen = policy.hidden
         if unseen is None and algorithm.actor.acts_on_prediction:
-            fix = "train it again"
-            raise InputError(file, "lacks the scales of its prediction", fix=fix)
-        unseen = unseen or (
-            np.zeros(hidden, np.float32),
-            np.ones(hidden, np.float32),
-        )  # of an actor that predicts nothing
+            raise InputError(file, "lacks the scales of its prediction", fix="train it again")
+        if unseen is None:  # it predicts nothing
+            unseen = np.zeros(hidden, np.float32), np.ones(hidden, np.float32)
         mean, deviation = (np.concatenate(pair) for pair in zip((mean, deviation), unseen, strict=True))
-    # One update lies behind it, so that it acts at once.
     scales = RunningStats.of(mean, deviation, KNOWN)
-    return algorithm.with_fresh_average(
-        dataclasses.replace(learner, actor=nested(new), moments=scales, updates=jnp.int32(1))
-    )
+    # with one update done, the policy acts from the first step on
+    learner = dataclasses.replace(learner, actor=nested(new), moments=scales, updates=jnp.int32(1))
+    return algorithm.with_fresh_average(learner)
 
 
 def _settings(policy: Policy) -> str:
