@@ -64,7 +64,7 @@ def test_wrong_options_name_what_is_near(tmp_path, capsys):
         (["rollout", "CookingMeat", "--video", "a.doc"], "not a video format"),
         (["rollout", "CookingMeat", "--record", "no/such.h5"], "folder no does not exist"),
         (["rollout", "CookingMeat", "--record", str(tmp_path)], "is a folder"),
-        (["rollout", "CookingMeat", "--format", "igibson"], "--record FILE, which is missing"),
+        (["rollout", "CookingMeat", "--format", "igibson"], "needs --record FILE"),
         (["demos", "collect", "CookingMeat", "--out", "a.h5", "--noise", "nan"], "--noise nan"),
         (["demos", "collect", "CookingMeat", "--out", "a.h5", "--disturbed", "4"], "--disturbed 4.0"),
         (["demos", "collect", "CookingMeat", "--out", str(tmp_path)], "is a folder"),
