@@ -16,7 +16,7 @@ from tiny_home import home_manifest, scene_xml
 import ig2mj
 from ig2mj.agents.floating_hand import FloatingHand
 from ig2mj.engine.native.engine import NativeEngine
-from ig2mj.engine.view import SCHEMA, read_field, replace_fields
+from ig2mj.engine.view import SCHEMA, LazyFields, PhysicsView, read_field, replace_fields
 from ig2mj.predicates import compile_expression
 from ig2mj.scene import manifest as mf
 from ig2mj.states import initial_states
@@ -227,8 +227,7 @@ def test_states_changed_from_outside_are_seen():
 def _moved(scene, **fields):
     """A view in which only agents are elsewhere, if `scene` is that of the last one."""
     view = replace_fields(VIEWS[0], {f"agent.{name}": np.array([[at]], np.float32) for name, at in fields.items()})
-    view.__dict__["_but_agents"] = scene
-    return view
+    return PhysicsView.over(LazyFields({}, lambda name: getattr(view, name), scene))
 
 
 def test_agents_that_move_away_from_buttons_are_no_work_for_the_states(monkeypatch):

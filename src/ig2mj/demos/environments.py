@@ -55,7 +55,8 @@ class RecordedEnvironment(Environment):
         observations: bool = False,
     ):
         """See `record`."""
-        self.__dict__.update(env.__dict__)
+        for name, value in vars(env).items():
+            setattr(self, name, value)
         self._inner, self._file = env, file
         self._worlds = list(range(env.num_worlds)) if worlds is None else sorted(worlds)
         if self._worlds and not 0 <= self._worlds[0] <= self._worlds[-1] < env.num_worlds:

@@ -16,7 +16,7 @@ import functools
 import operator
 import typing
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, ClassVar, TypeVar
 
 import jax
 import numpy as np
@@ -33,21 +33,48 @@ def _field(doc: str) -> Any:
     return dataclasses.field(metadata={"doc": doc})
 
 
-class _MadeLater:
-    """Lets an engine leave fields to be made when somebody reads them first: it puts no array but `_later`, a function
-    from a field's name to its array, into the instance."""
+V = TypeVar("V")
+
+
+class LazyFields(dict[str, Any]):
+    """Fields of a view by name; those that are missing are computed when they are read first.
+
+    Attributes:
+      make: computes a field from its name; raises AttributeError where there is none of that name. but_agents: see the
+        function `but_agents`.
+    """
+
+    def __init__(self, known: Mapping[str, Any], make: Callable[[str], Any], but_agents: object | None = None):
+        super().__init__(known)
+        self.make, self.but_agents = make, but_agents
+
+    def __missing__(self, name: str) -> Any:
+        array = self[name] = self.make(name)
+        return array
+
+
+class _FieldsOf:
+    """Lets an engine make a view of a mapping, such as `LazyFields`, in place of the constructor's arguments."""
+
+    _mapping: ClassVar[Mapping[str, Any]] = {}
+
+    @classmethod
+    def over(cls: type[V], fields: Mapping[str, Any]) -> V:
+        """A view whose fields are those of a mapping, read when they are asked for."""
+        view = object.__new__(cls)
+        object.__setattr__(view, "_mapping", fields)
+        return view
 
     if not typing.TYPE_CHECKING:
 
-        def __getattr__(self, name: str) -> Array:
-            later = self.__dict__.get("_later")
-            if later is None:
-                raise AttributeError(name)
-            array = self.__dict__[name] = later(name)
-            return array
+        def __getattr__(self, name: str) -> Any:
+            try:
+                return self._mapping[name]
+            except KeyError:
+                raise AttributeError(name) from None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles have all fields; what makes fields later belongs to an engine."""
+        """Copies and pickles have all fields; a mapping belongs to an engine."""
         names = [field.name for field in dataclasses.fields(typing.cast(Any, self))]
         return type(self), tuple(getattr(self, name) for name in names)
 
@@ -65,7 +92,7 @@ def length(array: Any, axis: int = 0) -> int | None:
 
 
 @struct.dataclass
-class AgentView(_MadeLater):
+class AgentView(_FieldsOf):
     """All agents, their hands and fingers at the end of a control step; world frame, SI units, w-x-y-z quaternions."""
 
     base_pos: Float[Array, "W A 3"] = _field("origin of the base body")
@@ -96,7 +123,7 @@ class AgentView(_MadeLater):
 
 
 @struct.dataclass
-class PhysicsView(_MadeLater):
+class PhysicsView(_FieldsOf):
     """A snapshot of physics at the end of a control step: world frame, SI units, w-x-y-z quaternions, float32.
 
     Contacts, and with them `touching` and forces, are those of the engine's last collision stage (see the engines).
@@ -131,9 +158,8 @@ class PhysicsView(_MadeLater):
     agent: AgentView = _field("agents, hands and fingers")
 
     def __repr__(self) -> str:
-        pos = self.__dict__.get("object_pos")
-        bodies = length(self.__dict__.get("body_pos"), 1)
-        return counted(self, worlds=length(pos), objects=length(pos, 1), bodies=bodies)
+        pos, bodies = (getattr(self, name, None) for name in ("object_pos", "body_pos"))
+        return counted(self, worlds=length(pos), objects=length(pos, 1), bodies=length(bodies, 1))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -195,10 +221,15 @@ def read_field(view: PhysicsView, name: str) -> Array:
     return getattr(view.agent, name[6:]) if name.startswith("agent.") else getattr(view, name)
 
 
+def fields_of(view: PhysicsView | AgentView) -> Mapping[str, Any]:
+    """The mapping behind a view; empty for one that a constructor made."""
+    return view._mapping
+
+
 def but_agents(view: PhysicsView) -> object | None:
     """What stands for all of a view but its agents and their bodies: the same object in views between which nothing
-    else changed. None where the engine does not tell."""
-    return view.__dict__.get("_but_agents")
+    else changed. None where the engine does not say."""
+    return getattr(view._mapping, "but_agents", None)
 
 
 def read_fields(view: PhysicsView, names: tuple[str, ...]) -> list[Array]:
@@ -227,14 +258,15 @@ EYES = ("eye_pos", "eye_quat")
 
 
 def with_eyes_later(view: PhysicsView, eyes: Callable[[], tuple[Array, Array]]) -> PhysicsView:
-    """The view with other poses of eyes [W, A, 3], [W, A, 4], made when somebody reads one of them; never traced."""
-    new, agent = object.__new__(PhysicsView), object.__new__(AgentView)
-    new.__dict__.update(view.__dict__)
-    agent.__dict__.update({name: array for name, array in view.agent.__dict__.items() if name not in EYES})
-    others = view.agent.__dict__.get("_later", view.agent.__getattribute__)
-    agent.__dict__["_later"] = lambda name: eyes()[EYES.index(name)] if name in EYES else others(name)
-    new.__dict__["agent"] = agent
-    return new
+    """The view with other poses of eyes [W, A, 3], [W, A, 4], computed when one of them is read first; never traced."""
+    agent = view.agent
+
+    def make(name: str) -> Any:
+        return eyes()[EYES.index(name)] if name in EYES else getattr(agent, name)
+
+    fields = {name: array for name, array in fields_of(agent).items() if name not in EYES}
+    own = {"agent": AgentView.over(LazyFields(fields, make))}
+    return PhysicsView.over(LazyFields({**fields_of(view), **own}, lambda name: getattr(view, name), but_agents(view)))
 
 
 OF_CONSTRAINTS = ("touching", "link_force", "awake", "held", "agent.finger_force", "agent.touching")

@@ -67,6 +67,7 @@ class UrdfRobot(TaskRobot):
     Attributes:
       folder: what the converter wrote. name: of the agent; the converted robot's, or another.
       description, layout: what it is. pos, quat: of its base; z is the floor that it stands on.
+      compiled: `body`, where it is compiled already.
     """
 
     folder: pathlib.Path
@@ -75,6 +76,7 @@ class UrdfRobot(TaskRobot):
     layout: Layout
     pos: Vector = (0, 0, 0)
     quat: Vector = (1, 0, 0, 0)
+    compiled: RobotBody | None = dataclasses.field(default=None, repr=False)
 
     own_actions = True
 
@@ -103,14 +105,12 @@ class UrdfRobot(TaskRobot):
         robot = cls(path, name or description.name, description, found)
         body = robot.body
         body.check(found)
-        robot = dataclasses.replace(robot, layout=with_closed_limits(body, found))
-        vars(robot)["body"] = body  # compiled once
-        return robot
+        return dataclasses.replace(robot, layout=with_closed_limits(body, found), compiled=body)
 
     @functools.cached_property
     def body(self) -> RobotBody:
         """Its bodies and joints, compiled alone."""
-        return RobotBody(self.folder, self.description)
+        return RobotBody(self.folder, self.description) if self.compiled is None else self.compiled
 
     @property
     def drives(self) -> bool:

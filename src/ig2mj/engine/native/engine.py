@@ -32,7 +32,7 @@ from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.model_fields import check_written, given
 from ig2mj.engine.native.contacts import ForcePlan
 from ig2mj.engine.native.execution import HostExecution
-from ig2mj.engine.native.later import RAW, LaterPlan
+from ig2mj.engine.native.lazy_fields import RAW, LazyPlan
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.one_world import Statics, World
 from ig2mj.engine.native.physics import LiveWorlds, NativePhysics
@@ -100,7 +100,7 @@ class NativeEngine(HostExecution, SceneEngine):
                 make_box_table(self.boxes, model, self.tables, self.layout),
                 np.asarray(model.body_treeid, int),
             ),
-            later=LaterPlan.build(model, self.tables, self.layout, self.touch_tolerance),
+            lazy=LazyPlan.build(model, self.tables, self.layout, self.touch_tolerance),
             has_agents=len(self.tables.agent_names) > 0,
             layers=BitLayers(model, self.tables),
             forces=ForcePlan.build(
@@ -333,7 +333,7 @@ class NativeEngine(HostExecution, SceneEngine):
         sizes = axis_sizes(self.tables, num_worlds)
         arrays = {name: np.zeros(SCHEMA[name].shape(sizes), SCHEMA[name].dtype) for name in FIELDS}
         arrays["qvel"] = np.zeros((num_worlds, self._slots[0].model.nv))
-        arrays[RAW] = np.zeros((num_worlds, self._statics.later.raw.size))
+        arrays[RAW] = np.zeros((num_worlds, self._statics.lazy.raw.size))
         return arrays
 
     def to_mujoco(self, physics: NativePhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:

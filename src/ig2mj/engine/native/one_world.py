@@ -13,7 +13,7 @@ from ig2mj.engine.controls import LARGEST, clip
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.model_fields import ModelFields, given
 from ig2mj.engine.native.contacts import FINGER, LINK, NOTHING_MET, ForcePlan, Met, StepContacts, touching_units
-from ig2mj.engine.native.later import RAW, AgentContacts, LaterPlan, agents_touching, of_owners
+from ig2mj.engine.native.lazy_fields import RAW, AgentContacts, LazyPlan, agents_touching, of_owners
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.nonfinite import why_lost
 from ig2mj.engine.native.sleep import restore_sleep, wake_trees
@@ -32,7 +32,7 @@ class Statics:
     """What all worlds of an engine share.
 
     Attributes:
-      later: plan of the fields that are made later. has_agents: there is one.
+      lazy: plan of the fields that are computed when they are read. has_agents: there is one.
       layers: the contact filter. forces: what forces of contacts are of interest.
       own_fields: fields of the model that each world has for itself besides eq_data. substeps: a number for each.
       incremental: a world in which everything sleeps is not stepped.
@@ -42,7 +42,7 @@ class Statics:
     tables: SceneTables
     layout: ModelLayout
     poses: PoseRows
-    later: LaterPlan
+    lazy: LazyPlan
     has_agents: bool
     layers: BitLayers
     forces: ForcePlan
@@ -79,7 +79,7 @@ class World:
         self.agent_contacts = AgentContacts(nothing, None, *self._no_contacts)
         self._agent_fresh: np.ndarray | None = None
         self._sleeping_agents = np.zeros(0, int)  # rows of `_cvel`
-        self._raw = statics.later.raw
+        self._raw = statics.lazy.raw
         self._copied = self._raw.copied(self.data, rows[RAW])
         self._cvel = self._raw.parts(rows[RAW][None])["cvel"][0]
         self.fields: dict[str, np.ndarray] = {name: slot.own(name) for name in ("eq_data", *statics.own_fields)}
@@ -200,7 +200,7 @@ class World:
 
     def agents_touch(self) -> np.ndarray:
         """Touching of agents' units with objects' [agents' units, V]."""
-        return agents_touching(self.statics.later, self.agent_contacts)
+        return agents_touching(self.statics.lazy, self.agent_contacts)
 
     def start(self) -> int:
         """The scene's initial state: its first keyframe, else the zero pose."""
@@ -366,17 +366,17 @@ class World:
         return self.data.eq_active[self.statics.layout.grasp_equality].astype(bool)
 
     def _refresh_touching(self, everything: bool) -> int:
-        later, near = self.statics.later, self._dist <= self.statics.tolerance
+        lazy, near = self.statics.lazy, self._dist <= self.statics.tolerance
         told = near.tobytes()
         met, before, fresh, units = self._told
         if told == before and self._met is met and self._fresh is fresh and self.units is units and not everything:
             return Changed.NOTHING  # the same contacts said so before
-        units = touching_units(later.object_unit[self._met.geom], near, self.units, self._fresh)
+        units = touching_units(lazy.object_unit[self._met.geom], near, self.units, self._fresh)
         self._told = self._met, told, self._fresh, units
         if units is self.units and not everything:
             return Changed.NOTHING
         self.units = units
         touching = self.rows["touching"]
-        touching[:] = of_owners(of_owners(units, later.unit_starts, 0), later.unit_starts, 1)
+        touching[:] = of_owners(of_owners(units, lazy.unit_starts, 0), lazy.unit_starts, 1)
         np.fill_diagonal(touching, False)
         return Changed.TOUCHING

@@ -7,7 +7,7 @@ makes the next generation and returns a new handle, so that older handles are re
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax
@@ -15,11 +15,11 @@ import numpy as np
 
 from ig2mj.engine.native.contacts import FingerForces
 from ig2mj.engine.native.copying import clone, restore
-from ig2mj.engine.native.later import RAW, Agents, ObjectMotion
+from ig2mj.engine.native.lazy_fields import RAW, Agents, ObjectMotion
 from ig2mj.engine.native.one_world import Statics, World
 from ig2mj.engine.native.view_rows import FIELDS, OF_AGENTS, Changed
 from ig2mj.engine.saved import SavedPhysics
-from ig2mj.engine.view import AgentView, PhysicsView
+from ig2mj.engine.view import AgentView, LazyFields, PhysicsView, but_agents, fields_of
 from ig2mj.errors import EngineError, StaleStateError
 
 _VELOCITIES = ("object_linvel", "object_angvel")
@@ -38,7 +38,8 @@ class LiveWorlds:
         self.worlds, self.arrays, self.statics = worlds, arrays, statics
         self.generation = 0
         self.view: PhysicsView | None = None
-        self.of_agents: Agents  # what makes the fields of the view's agents
+        self.of_objects: ObjectMotion  # these three compute fields of the view
+        self.of_agents: Agents
         self.of_fingers: FingerForces
 
     def changed(self) -> NativePhysics:
@@ -56,7 +57,8 @@ class LiveWorlds:
         rows = [{name: array[w] for name, array in arrays.items()} for w in range(len(self.worlds))]
         new = LiveWorlds([clone(*pair) for pair in zip(self.worlds, rows, strict=True)], arrays, self.statics)
         if self.view is not None:  # nobody changes views, nor what makes fields of them later
-            new.view, new.of_agents, new.of_fingers = self.view, self.of_agents, self.of_fingers
+            new.view, new.of_objects = self.view, self.of_objects
+            new.of_agents, new.of_fingers = self.of_agents, self.of_fingers
         return new
 
     def saved(self) -> SavedPhysics:
@@ -82,44 +84,34 @@ class LiveWorlds:
     def update(self, changed: int) -> PhysicsView:
         """The view of the present state: copies of what changed, the old arrays for the rest."""
         if self.view is None:
-            self.view, changed = PhysicsView.__new__(PhysicsView), Changed.ALL
-            self.view.__dict__["agent"] = AgentView.__new__(AgentView)
-        elif changed:
-            self.view = _copied(self.view)
-        if changed:
-            arrays, fields = self.arrays, self.view.__dict__
-            for name in _fields_of(changed):
-                fields[name] = arrays[name].copy()
-            if changed & Changed.OBJECTS:
-                motion = ObjectMotion(self.statics.later, arrays["qvel"].copy(), fields["object_quat"])
-                _make_later(self.view, _VELOCITIES, motion)
-            if changed & ~OF_AGENTS:
-                fields["_but_agents"] = object()
-            if changed & OF_AGENTS:
-                fields["agent"] = self._agents(self.view.agent, fields, changed)
+            self.view, changed = PhysicsView.over({}), Changed.ALL
+        if not changed:
+            return self.view
+        arrays, known = self.arrays, dict(fields_of(self.view))
+        for name in _fields_of(changed):
+            known[name] = arrays[name].copy()
+        if changed & Changed.OBJECTS:
+            for name in _VELOCITIES:
+                known.pop(name, None)
+            self.of_objects = ObjectMotion(self.statics.lazy, arrays["qvel"].copy(), known["object_quat"])
+        if changed & OF_AGENTS:
+            known["agent"] = self._agents(known, changed)
+        scene = object() if changed & ~OF_AGENTS else but_agents(self.view)
+        self.view = PhysicsView.over(LazyFields(known, self.of_objects, scene))
         return self.view
 
-    def _agents(self, before: AgentView, fields: dict[str, Any], changed: int) -> AgentView:
-        known, statics = before.__dict__, self.statics
-        agent = object.__new__(AgentView)
-        kept = agent.__dict__
+    def _agents(self, fields: Mapping[str, Any], changed: int) -> AgentView:
+        known = dict(fields_of(fields["agent"])) if "agent" in fields else {}
         if changed & Changed.AGENT:
-            contacts = [world.agent_contacts for world in self.worlds]
+            contacts, force = [world.agent_contacts for world in self.worlds], known.get("finger_force")
             raw = self.arrays[RAW].copy()
-            self.of_agents = Agents(statics.later, fields["body_pos"], fields["body_quat"], raw, contacts)
-            if "finger_force" in known:
-                kept["finger_force"] = known["finger_force"]
-        else:
-            kept.update(known)
+            self.of_agents = Agents(self.statics.lazy, fields["body_pos"], fields["body_quat"], raw, contacts)
+            known = {} if force is None else {"finger_force": force}
         if changed & Changed.FINGERS:  # worlds change no list that stands here
-            self.of_fingers = FingerForces(statics.forces, [world.pressing for world in self.worlds])
-            kept.pop("finger_force", None)
-        kept["_later"] = self._of_both()
-        return agent
-
-    def _of_both(self) -> Callable[[str], np.ndarray]:
+            self.of_fingers = FingerForces(self.statics.forces, [world.pressing for world in self.worlds])
+            known.pop("finger_force", None)
         agents, fingers = self.of_agents, self.of_fingers
-        return lambda name: fingers() if name == "finger_force" else agents(name)
+        return AgentView.over(LazyFields(known, lambda name: fingers() if name == "finger_force" else agents(name)))
 
 
 class _Unpickled:
@@ -201,20 +193,6 @@ class NativePhysics:
 
 def _unpickled(saved: SavedPhysics) -> NativePhysics:
     return NativePhysics(_Unpickled(saved), 0)
-
-
-def _copied(view: PhysicsView) -> PhysicsView:
-    """A view of the same arrays; the constructor of a frozen dataclass costs more than to copy what changed."""
-    new = object.__new__(PhysicsView)
-    new.__dict__.update(view.__dict__)
-    return new
-
-
-def _make_later(view: PhysicsView, names: tuple[str, ...], later: Callable[[str], np.ndarray]) -> None:
-    fields = view.__dict__
-    for name in names:
-        fields.pop(name, None)
-    fields["_later"] = later
 
 
 @functools.cache

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from ig2mj.engine.layout import ModelLayout
-from ig2mj.engine.native.later import multiply
+from ig2mj.engine.native.lazy_fields import multiply
 from ig2mj.engine.object_boxes import BoxPlan, BoxTable, plan_boxes, world_boxes
 from ig2mj.scene.tables import SceneTables
 

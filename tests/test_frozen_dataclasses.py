@@ -1,0 +1,59 @@
+"""What a frozen dataclass holds is given to its constructor: nobody edits its attributes behind its back."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+CONSTRUCTOR = ("engine/view.py", "over")
+"""The one function that sets an attribute of an object that it has just made: see `engine.view._FieldsOf`."""
+
+
+def _edits(source: str, setter: str = "") -> list[str]:
+    """Uses of `__dict__`, writes through `vars`, and calls of `object.__setattr__` outside of the function `setter`."""
+    tree = ast.parse(source)
+    allowed = [n for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) and f.name == setter for n in ast.walk(f)]
+    found = []
+    for node in ast.walk(tree):
+        match node:
+            case ast.Attribute(attr="__dict__"):
+                found.append(f"line {node.lineno}: __dict__")
+            case ast.Attribute(value=ast.Name(id="object"), attr="__setattr__") if node not in allowed:
+                found.append(f"line {node.lineno}: object.__setattr__")
+            case (
+                ast.Attribute(value=ast.Call(func=ast.Name(id="vars")), attr="update" | "pop" | "setdefault")
+                | ast.Subscript(value=ast.Call(func=ast.Name(id="vars")), ctx=ast.Store() | ast.Del())
+            ):
+                found.append(f"line {node.lineno}: vars")
+    return found
+
+
+def test_no_module_edits_attributes_behind_a_class(repository: Path):
+    found = {}
+    for folder in ("src/ig2mj", "converters", "homes"):
+        for path in sorted((repository / folder).rglob("*.py")):
+            name = path.relative_to(repository / folder).as_posix()
+            edits = _edits(path.read_text(), CONSTRUCTOR[1] if name == CONSTRUCTOR[0] else "")
+            found |= {f"{folder}/{name}": edits} if edits else {}
+    assert not found
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "view.__dict__['pos'] = 1",
+        "fields = view.__dict__",
+        "vars(view)['pos'] = 1",
+        "del vars(view)['pos']",
+        "vars(view).update(pos=1)",
+        "object.__setattr__(view, 'pos', 1)",
+    ],
+)
+def test_each_way_to_edit_is_found(source):
+    assert _edits(source)
+
+
+def test_reading_is_no_edit():
+    assert not _edits("names = list(vars(view))\nview = dataclasses.replace(view, pos=1)\nsetattr(view, 'pos', 1)")
