@@ -11,7 +11,9 @@ import pytest
 from hand_world import HandWorld, Item, step
 
 from ig2mj.states import initial_states, particles
-from ig2mj.states.definitions import cleaning, dust, stain
+from ig2mj.states.definitions import cleaning
+from ig2mj.states.definitions.dust import DUST
+from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.particles import NUM_PARTICLES
 
 DIRT = {"dustyable": {}, "stainable": {}}
@@ -32,8 +34,8 @@ PLACES = np.stack([np.linspace(-0.95, 0.95, NUM_PARTICLES), np.zeros(NUM_PARTICL
 UP = np.tile([0.0, 0.0, 1.0], (NUM_PARTICLES, 1))
 
 
-_set_dusty = jax.jit(dust.set_dusty, static_argnums=(0, 2))
-_set_stained = jax.jit(stain.set_stained, static_argnums=(0, 2))
+_set_dusty = jax.jit(DUST.place, static_argnums=(0, 2))
+_set_stained = jax.jit(STAIN.place, static_argnums=(0, 2))
 
 
 def _points(valid: int = NUM_PARTICLES):
@@ -66,8 +68,8 @@ def test_twenty_placed_are_dirty_at_eleven_and_clean_at_ten(alive, dirty):
     model = ROOM.model()
     rows = _dirty().dust
     rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < alive))
-    assert bool(dust.dusty(model, rows)[0, 0]) == dirty
-    assert bool(stain.stained(model, rows)[0, 0]) == dirty
+    assert bool(DUST.is_dirty(model, rows)[0, 0]) == dirty
+    assert bool(STAIN.is_dirty(model, rows)[0, 0]) == dirty
 
 
 @pytest.mark.parametrize(("alive", "dirty"), [(16, True), (15, False)])
@@ -76,8 +78,8 @@ def test_floors_are_dirty_at_sixteen_and_clean_at_fifteen_in_igibsons_code(alive
     model = home.model(compat="igibson")
     rows, _ = _set_dusty(model, initial_states(model, 1).dust, 0, *_points())
     rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < alive))
-    assert bool(dust.dusty(model, rows)[0, 0]) == dirty
-    assert bool(dust.dusty(home.model(), rows)[0, 0])  # the paper's threshold is one half for all
+    assert bool(DUST.is_dirty(model, rows)[0, 0]) == dirty
+    assert bool(DUST.is_dirty(home.model(), rows)[0, 0])  # the paper's threshold is one half for all
 
 
 def test_table_a1_the_threshold_is_configurable_per_model():
@@ -85,7 +87,7 @@ def test_table_a1_the_threshold_is_configurable_per_model():
     model = home.model()
     rows, _ = _set_dusty(model, initial_states(model, 1).dust, 0, *_points())
     rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < 3))
-    assert bool(dust.dusty(model, rows)[0, 0])
+    assert bool(DUST.is_dirty(model, rows)[0, 0])
 
 
 def test_table_a4_levels_are_fractions_of_the_placed_particles():
@@ -193,10 +195,10 @@ def test_dirtying_what_is_dirty_replaces_the_particles():
 
 
 def test_table_a5_dusty_false_removes_all_particles():
-    clean = dust.set_not_dusty(_dirty().dust, 0)
+    clean = particles.remove(_dirty().dust, 0)
     assert not clean.alive.any()
-    assert not bool(dust.dusty(ROOM.model(), clean)[0, 0])
-    assert not bool(stain.stained(ROOM.model(), stain.set_not_stained(_dirty().stain, 0))[0, 0])
+    assert not bool(DUST.is_dirty(ROOM.model(), clean)[0, 0])
+    assert not bool(STAIN.is_dirty(ROOM.model(), particles.remove(_dirty().stain, 0))[0, 0])
 
 
 @pytest.mark.parametrize(
@@ -208,7 +210,7 @@ def test_dirt_needs_all_particles_placed_or_five_in_igibsons_code(compat, valid,
     rows, done = _set_dusty(model, initial_states(model, 1).dust, 0, *_points(valid))
     assert bool(done[0]) == works
     assert int(rows.alive.sum()) == (valid if works else 0)
-    assert bool(dust.dusty(model, rows)[0, 0]) == works
+    assert bool(DUST.is_dirty(model, rows)[0, 0]) == works
 
 
 def test_the_number_placed_is_part_of_the_state():
@@ -216,7 +218,7 @@ def test_the_number_placed_is_part_of_the_state():
     rows = _dirty().dust
     rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < 8))
     assert int(rows.placed.sum()) == 20
-    assert not bool(dust.dusty(ROOM.model(), rows)[0, 0])
+    assert not bool(DUST.is_dirty(ROOM.model(), rows)[0, 0])
 
 
 def test_setting_dirt_in_some_worlds_leaves_the_others():
@@ -240,5 +242,5 @@ def test_a_nan_table_is_not_cleaned():
 
 def test_objects_without_the_ability_have_no_rows():
     model = ROOM.model()
-    assert dust.row_of(model, ROOM.index["table"]) == 0
-    assert dust.row_of(model, ROOM.index["rag"]) is None
+    assert DUST.row_of(model, ROOM.index["table"]) == 0
+    assert DUST.row_of(model, ROOM.index["rag"]) is None

@@ -10,7 +10,8 @@ import pytest
 from hand_world import IDENTITY, HandWorld, Item, step, stepper
 
 from ig2mj.states import initial_states
-from ig2mj.states.definitions import sliced, stain
+from ig2mj.states.definitions import sliced
+from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.particles import NUM_PARTICLES, world_positions
 
 FOOD = {"cookable": {}, "burnable": {}, "freezable": {}, "soakable": {}, "stainable": {}, "sliceable": {}}
@@ -89,10 +90,10 @@ def _used():
     states = initial_states(model, 1)
     pos = np.tile([-0.04, 0.01, 0.0], (NUM_PARTICLES, 1)).astype(np.float32)[None]
     normal = np.tile([-1.0, 0, 0], (NUM_PARTICLES, 1)).astype(np.float32)[None]
-    rows, done = stain.set_stained(
+    rows, done = STAIN.place(
         model,
         states.stain,
-        stain.row_of(model, APPLE),
+        STAIN.row_of(model, APPLE),
         jnp.full((1, NUM_PARTICLES), APPLE + 1, jnp.int32),
         jnp.asarray(pos),
         jnp.asarray(normal),
@@ -123,12 +124,12 @@ def test_halves_inherit_particles_where_they_are():
     where = {"apple": (50, 0, 0), "half_a": swap.pos[0, 1].tolist(), "half_b": swap.pos[0, 2].tolist()}
     placed = world_positions(states.stain, HOME.view(where))
     for half, expected in ((HALF_A, (0.96, 2.01, 0.5)), (HALF_B, (1.0, 2.01, 0.5))):
-        row = stain.row_of(model, half)
+        row = STAIN.row_of(model, half)
         assert int(states.stain.alive[0, row].sum()) == 13
         assert int(states.stain.placed[0, row].sum()) == NUM_PARTICLES
         # The left half has them on its skin; the right one, that lost that side, on its cut.
         assert np.allclose(placed[0, row], expected, atol=1e-5)
-        assert bool(stain.stained(model, states.stain)[0, row])
+        assert bool(STAIN.is_dirty(model, states.stain)[0, row])
 
 
 def test_halves_are_heated_in_the_step_of_the_cut_like_the_whole():

@@ -20,7 +20,7 @@ from ig2mj.engine.view import SCHEMA, LazyFields, PhysicsView, read_field, repla
 from ig2mj.predicates import compile_expression
 from ig2mj.scene import manifest as mf
 from ig2mj.states import initial_states
-from ig2mj.states.definitions import dust
+from ig2mj.states.definitions.dust import DUST
 from ig2mj.worlds import Core, Rules
 from ig2mj.worlds.incremental import MANY, IncrementalRules
 
@@ -129,7 +129,7 @@ SEEN = [0] * 4 + [1] * 8 + [0] * 3 + [2] * 5 + [3] * 4 + [0] * 6 + [4] * 3 + [0]
 def _start(model):
     states = initial_states(model, 1)
     points = np.tile([0.0, 0.0, 0.02], (1, 20, 1)).astype(np.float32)
-    rows, _ = dust.set_dusty(
+    rows, _ = DUST.place(
         model, states.dust, 0, jnp.full((1, 20), 4), jnp.asarray(points), jnp.asarray(points), jnp.ones((1, 20), bool)
     )
     return states.replace(dust=rows)

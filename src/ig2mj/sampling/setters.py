@@ -19,9 +19,12 @@ from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.registry import PREDICATES
 from ig2mj.predicates.registry import find as find_predicate
 from ig2mj.sampling.surface_particles import sample_places
-from ig2mj.states import registry
-from ig2mj.states.definitions import dust, max_temperature, sliced, stain, temperature, toggled_on, wetness
+from ig2mj.states import particles, registry
+from ig2mj.states.definitions import max_temperature, sliced, temperature, toggled_on, wetness
+from ig2mj.states.definitions.dirt import Dirt
+from ig2mj.states.definitions.dust import DUST
 from ig2mj.states.definitions.open import sample_open
+from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.host import Randomness
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import StateSpec
@@ -172,27 +175,23 @@ def _sliced(t: _Task, value: bool) -> Change:
     return Change(*sliced.set_sliced(t.model, t.states, only, t.view))
 
 
-def _dirty(field: str) -> Callable[[_Task, bool], Change]:
-    module = {"dust": dust, "stain": stain}[field]
-    put = {"dust": dust.set_dusty, "stain": stain.set_stained}[field]
-    clean = {"dust": dust.set_not_dusty, "stain": stain.set_not_stained}[field]
-
+def _dirty(dirt: Dirt) -> Callable[[_Task, bool], Change]:
     def setter(t: _Task, value: bool) -> Change:
-        rows, done = getattr(t.states, field), True
+        rows, done = getattr(t.states, dirt.name), True
         rng = _generator(t.key)
         for obj in t.objects:
-            row = module.row_of(t.model, obj)
+            row = dirt.row_of(t.model, obj)
             if row is None:
                 continue
             if value:
                 p = sample_places(t.model.tables, t.view, obj, rng)
-                rows, placed = put(t.model, rows, row, p.body, p.pos, p.normal, p.valid)
+                rows, placed = dirt.place(t.model, rows, row, p.body, p.pos, p.normal, p.valid)
                 done &= bool(np.all(placed))
             else:
-                rows = clean(rows, row)
+                rows = particles.remove(rows, row)
         if not done:
             raise StateError(f"'{t.object_name}' has too little surface for particles")
-        return Change(dataclasses.replace(t.states, **{field: rows}))
+        return Change(dataclasses.replace(t.states, **{dirt.name: rows}))
 
     return setter
 
@@ -209,7 +208,7 @@ _SETTERS: dict[str, Callable[[_Task, bool], Change]] = {
     "toggled_on": _toggled_on,
     "open": _open,
     "sliced": _sliced,
-    "dusty": _dirty("dust"),
-    "stained": _dirty("stain"),
+    "dusty": _dirty(DUST),
+    "stained": _dirty(STAIN),
 }
 """Predicates that need no placement, and how each is set."""

@@ -30,7 +30,7 @@ TRIES = 40
 
 @dataclasses.dataclass(frozen=True)
 class SurfacePlaces:
-    """Places of N particles in the frames of bodies; arguments of `dust.set_dusty` and `stain.set_stained`."""
+    """Places of N particles in the frames of bodies; arguments of `Dirt.place`."""
 
     body: Int[np.ndarray, "1 N"]
     pos: Float[np.ndarray, "1 N 3"]

@@ -20,7 +20,7 @@ from ig2mj.errors import AbilityError
 from ig2mj.geometry.poses import quat_rotate
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import LinkKind
-from ig2mj.states.definitions import stain
+from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 
@@ -114,7 +114,7 @@ def _link(model: StateModel, obj: int, name: str, kind: LinkKind, above: float) 
 
 
 def _nearest_stain(model: StateModel, name: str, obj: int, to: int) -> Locate:
-    row = stain.row_of(model, obj)
+    row = STAIN.row_of(model, obj)
     if row is None:
         raise AbilityError(f"'{name}' cannot be stained")
 

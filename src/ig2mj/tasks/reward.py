@@ -19,7 +19,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import length
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.scene import Scene
-from ig2mj.states.definitions import stain
+from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.points import locator
@@ -74,7 +74,7 @@ class Reward:
         self.hands = own[np.array(acts.hands, int)]
         self._first = scene.object_index(task.objects_of_interest[0])
         self._ground = np.flatnonzero(np.isin(np.array(scene.tables.object_categories), GROUND))
-        self._stain_row = None if task.stains_of is None else stain.row_of(model, scene.object_index(task.stains_of))
+        self._stain_row = None if task.stains_of is None else STAIN.row_of(model, scene.object_index(task.stains_of))
 
     def measure(
         self, view: PhysicsView, states: ExtendedStates, status: GoalStatus, before: ActivityMeasures | None = None

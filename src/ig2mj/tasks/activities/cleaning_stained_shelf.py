@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length
-from ig2mj.states.definitions import stain
+from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.particles import world_normals, world_positions
 from ig2mj.tasks.experts.motion import HandMotion, hand_motion, levelled, over, where
 from ig2mj.tasks.experts.pushing import draw
@@ -60,7 +60,7 @@ def plan(see: ExpertView) -> list[HandMotion]:
 
 def _nearest(see: ExpertView, towel: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
     """The stain on the board's top that is nearest to the towel; the towel itself where there is none."""
-    row = stain.row_of(see.model, see.scene.object_index(SHELF))
+    row = STAIN.row_of(see.model, see.scene.object_index(SHELF))
     pos = world_positions(see.states.stain, see.view)[:, row]
     up = world_normals(see.states.stain, see.view)[:, row, :, 2] > FACING_UP
     left = jnp.asarray(see.states.stain.alive)[:, row] & up
