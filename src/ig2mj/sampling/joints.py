@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.base import Write
 from ig2mj.engine.view import PhysicsView
+from ig2mj.engine.writes import joints, teleports
 from ig2mj.sampling.bystanders import MOVED, Bystanders
 from ig2mj.sampling.placement import RESTING_PENETRATION
 from ig2mj.sampling.query import SceneQuery
@@ -54,15 +55,11 @@ class JointMover:
     def plan(self, positions: Float[np.ndarray, "1 J"], moves: Bool[np.ndarray, "1 J"]) -> JointMove:
         """A change of joints: positions in the order of `SceneTables.openable_*`, and which move."""
         tables, width = self.query.scene.tables, self.query.scene.model.nq
-        mask, qpos = np.zeros((1, width), bool), np.zeros((1, width))
-        mask[:, tables.openable_qposadr], qpos[:, tables.openable_qposadr] = moves, positions
-        along, pos, quat = self.query.carried(mask[0], qpos[0])
-        write = Write(qpos_mask=mask, qpos=qpos)
+        write = joints(width, tables.openable_qposadr, positions[0], moves[0])
+        along, pos, quat = self.query.carried(np.asarray(write.qpos_mask)[0], np.asarray(write.qpos)[0])
         if len(along):
-            shape = (1, tables.num_objects)
-            which, places, turns = np.zeros(shape, bool), np.zeros((*shape, 3)), np.zeros((*shape, 4))
-            which[0, along], places[0, along], turns[0, along] = True, pos, quat
-            write = dataclasses.replace(write, object_mask=which, object_pos=places, object_quat=turns)
+            carried = teleports(tables.num_objects, along, pos, quat)
+            write = dataclasses.replace(carried, qpos_mask=write.qpos_mask, qpos=write.qpos)
         return JointMove(self.object_index, positions, moves, write, along)
 
     def shoved_by(self, move: JointMove) -> list[str]:

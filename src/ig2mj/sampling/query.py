@@ -19,6 +19,7 @@ from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine, NativePhysics
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
+from ig2mj.engine.writes import teleports
 from ig2mj.process import entry_point
 from ig2mj.sampling.columns import ColumnMap, ColumnWindow, Level
 from ig2mj.sampling.footprint import Footprint, footprint
@@ -97,11 +98,7 @@ class SceneQuery:
 
     def place(self, object_index: int, pos: Float[np.ndarray, "3"], quat: Float[np.ndarray, "4"]) -> None:
         """Puts an object's main body somewhere (world frame, w-x-y-z), at rest and awake."""
-        count = self.scene.tables.num_objects
-        mask = np.zeros((1, count), bool)
-        positions, turns = np.zeros((1, count, 3)), np.zeros((1, count, 4))
-        mask[0, object_index], positions[0, object_index], turns[0, object_index] = True, pos, quat
-        self.write(Write(object_mask=mask, object_pos=positions, object_quat=turns))
+        self.write(teleports(self.scene.tables.num_objects, object_index, pos, quat))
 
     def write(self, write: Write) -> None:
         """Changes the world; see `ig2mj.engine.base.Write`."""

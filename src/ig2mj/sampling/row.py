@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import jax
 import numpy as np
 
-from ig2mj.engine.base import Write
 from ig2mj.engine.snapshot import Snapshot
+from ig2mj.engine.writes import teleports
 from ig2mj.errors import StateError
 from ig2mj.predicates.literals import object_index, room_index
 from ig2mj.sampling.bystanders import Bystanders
@@ -26,7 +26,7 @@ from ig2mj.sampling.rules import PLACEMENTS, elsewhere, on_floor
 from ig2mj.sampling.setters import Change, set_by_name
 from ig2mj.sampling.truths import Truths
 from ig2mj.states.model import StateModel
-from ig2mj.states.world import ExtendedStates, Swap
+from ig2mj.states.world import ExtendedStates
 
 SHARE = 3
 """An object may spend 1/SHARE of the remaining budget of the row before the sampler backtracks to the one before it."""
@@ -201,7 +201,8 @@ class RowSampler:
         change = self._change(condition, rng)
         self._states = change.states
         if change.swap is not None:
-            self.query.write(_teleports(self.model.swap_objects, change.swap, self.model.tables.num_objects))
+            pos, quat, mask = (np.asarray(field)[0] for field in (change.swap.pos, change.swap.quat, change.swap.mask))
+            self.query.write(teleports(self.model.tables.num_objects, self.model.swap_objects, pos, quat, mask))
 
     def _problem(self, conditions: Sequence[Condition], placed: Sequence[str]) -> str:
         """Why the finished row is no good, or ''."""
@@ -215,9 +216,3 @@ class RowSampler:
         if any(deepest[object_index(self.model, name)] > RESTING_PENETRATION for name in placed):
             return "stands in something at the end"
         return ""
-
-
-def _teleports(objects: np.ndarray, swap: Swap, count: int) -> Write:
-    mask, pos, quat = np.zeros((1, count), bool), np.zeros((1, count, 3)), np.zeros((1, count, 4))
-    mask[:, objects], pos[:, objects], quat[:, objects] = swap.mask, swap.pos, swap.quat
-    return Write(object_mask=mask, object_pos=pos, object_quat=quat)

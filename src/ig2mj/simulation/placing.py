@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from ig2mj.engine.base import Write
+from ig2mj.engine.writes import joints, teleports
 from ig2mj.errors import PoseError, UnknownNameError
 from ig2mj.scene.scene import Scene
 
@@ -31,9 +32,7 @@ def write_of_pose(scene: Scene, name: str, pos: Vector, quat: Vector) -> Write:
     length = float(np.linalg.norm(turn))
     if length < 1e-6:
         raise PoseError(f"the rotation of object '{name}' is the zero quaternion (give w, x, y, z)")
-    mask, at, to = np.zeros((1, number), bool), np.zeros((1, number, 3)), np.zeros((1, number, 4))
-    mask[0, index], at[0, index], to[0, index] = True, place, turn / length
-    return Write(object_mask=mask, object_pos=at, object_quat=to)
+    return teleports(number, index, place, turn / length)
 
 
 def write_of_joint(scene: Scene, name: str, q: float | int) -> Write:
@@ -42,12 +41,10 @@ def write_of_joint(scene: Scene, name: str, q: float | int) -> Write:
     Raises:
       UnknownNameError: no such joint. PoseError: it is a free joint, or q is not finite or beyond its range.
     """
-    address, width = joint_address(scene, name), scene.model.nq
+    address = joint_address(scene, name)
     place = float(_finite([q], 1, f"position of joint '{name}'")[0])
     _check_range(scene.model, name, place)
-    mask, values = np.zeros((1, width), bool), np.zeros((1, width))
-    mask[0, address], values[0, address] = True, place
-    return Write(qpos_mask=mask, qpos=values)
+    return joints(scene.model.nq, address, place)
 
 
 def joint_address(scene: Scene, name: str) -> int:

@@ -19,6 +19,7 @@ from jaxtyping import Float, Int
 from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.snapshot import Snapshot, fitted
+from ig2mj.engine.writes import joints
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.sampling.bystanders import Bystanders
 from ig2mj.sampling.joints import JointMover
@@ -336,10 +337,7 @@ def _settled_with_open_doors(query: SceneQuery) -> Snapshot:
     """The scene at rest, all doors between rooms wide open."""
     tables, model = query.scene.tables, query.scene.model
     doors = np.isin(np.array(tables.object_categories)[tables.openable_object], DOORS)
-    mask, qpos = np.zeros((1, model.nq), bool), np.zeros((1, model.nq))
-    address = tables.openable_qposadr[doors]
-    mask[0, address], qpos[0, address] = True, tables.openable_open[doors]
-    query.write(Write(qpos_mask=mask, qpos=qpos))
+    query.write(joints(model.nq, tables.openable_qposadr[doors], tables.openable_open[doors]))
     query.settle(SETTLE_SECONDS)
     return query.save()
 
