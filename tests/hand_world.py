@@ -21,8 +21,8 @@ from ig2mj.engine.view import SCHEMA, PhysicsView, axis_sizes, blank_view, fault
 from ig2mj.scene.tables import LinkKind, PieceKind, SceneTables
 from ig2mj.states import (
     ExtendedStates,
+    PlannedRelations,
     RelationPlan,
-    Relations,
     StateModel,
     StateOptions,
     Swap,
@@ -267,9 +267,9 @@ def stepper(model: StateModel) -> Callable[[ExtendedStates, PhysicsView], tuple[
     return jax.jit(lambda states, view: update(model, states, view))
 
 
-def answers(plan: RelationPlan, view: PhysicsView) -> Relations:
+def answers(plan: RelationPlan, view: PhysicsView) -> PlannedRelations:
     """`plan.evaluate`, jitted."""
-    return Relations(plan, jax.jit(lambda v: plan.evaluate(v).values)(view))
+    return PlannedRelations(plan, jax.jit(lambda v: plan.evaluate(v).values)(view))
 
 
 def world_of(view: PhysicsView, states: ExtendedStates) -> WorldState:

@@ -31,7 +31,7 @@ from ig2mj.demos.replay import Replayer
 from ig2mj.demos.selection import chosen_runs
 from ig2mj.demos.shipped import find_recording
 from ig2mj.envs.environment import Environment, EnvState
-from ig2mj.predicates.questions import Questions
+from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.registry import PREDICATES, find
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
@@ -150,7 +150,7 @@ class _Measuring:
         self.env, self.scene, self.model = env, env.scene, rules.model
         steps = env.period / (env.core.engine.substeps * env.core.engine.timestep)
         self._settle = round(settle / steps)
-        self._questions = Questions(rules.model, env.num_worlds)
+        self._questions = HostQueries(rules.model, env.num_worlds)
         tables = env.scene.tables
         self.bodies = np.flatnonzero(tables.body_object >= 0)
         self._groups = np.array([1, 0, 0, 0, 0, 0], np.uint8)  # what is seen

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, Literal
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +20,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import AnyArray
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query
+from ig2mj.states.relations.relations import Relations
 from ig2mj.states.relations.touching import finite
 from ig2mj.states.world import ExtendedStates
 
@@ -30,17 +31,6 @@ ANY_ROOM = -1
 """The room argument of `on_floor` where the floor itself is named, not a room."""
 
 
-@runtime_checkable
-class RelationsOfPairs(Protocol):
-    """Answers to pairs of object indices; see `ig2mj.states.relations.plan.Relations`."""
-
-    def inside(self, pairs: Any, /) -> Bool[Array, "W P"]: ...
-    def above(self, pairs: Any, /) -> Bool[Array, "W P"]: ...
-    def below(self, pairs: Any, /) -> Bool[Array, "W P"]: ...
-    def beside(self, pairs: Any, /) -> Bool[Array, "W P"]: ...
-    def near(self, pairs: Any, /) -> Bool[Array, "W P"]: ...
-
-
 @dataclasses.dataclass(frozen=True)
 class Context:
     """What predicates read: constants, extended states, physics, and the relations of this step."""
@@ -48,7 +38,7 @@ class Context:
     model: StateModel
     states: ExtendedStates
     view: PhysicsView
-    relations: RelationsOfPairs
+    relations: Relations
 
     @property
     def num_worlds(self) -> int:
@@ -78,7 +68,7 @@ def no_queries(model: StateModel, arguments: Arguments) -> list[Query]:
 class Predicate:
     """One logical predicate.
 
-    `Questions.reads` finds what it depends on by tracing it.
+    `HostQueries.reads` finds what it depends on by tracing it.
 
     Attributes:
       name: snake_case. arguments: what each argument is; an agent's index is the number of objects plus its own.

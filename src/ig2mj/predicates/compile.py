@@ -29,14 +29,15 @@ from ig2mj.knowledge import categories_of
 from ig2mj.predicates import logic
 from ig2mj.predicates.base import Context
 from ig2mj.predicates.evaluate import Truth, fraction, holds
+from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.literals import Literals
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.parse import parse
-from ig2mj.predicates.questions import Questions
 from ig2mj.process import entry_point
 from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations.plan import Query, RelationPlan, Relations
+from ig2mj.states.relations.plan import Query, RelationPlan
+from ig2mj.states.relations.relations import Relations
 from ig2mj.states.world import ExtendedStates, WorldState
 
 Groups = Mapping[str, Sequence[str]]
@@ -76,7 +77,7 @@ class CompiledExpression:
     source: Expression
     ground: Expression
     literals: Literals
-    questions: Questions | None = None
+    questions: HostQueries | None = None
 
     @functools.cached_property
     def atoms(self) -> tuple[Atom, ...]:
@@ -151,7 +152,7 @@ def compile_expression(
     expression: Expression | str,
     groups: Groups | None = None,
     strict: bool = False,
-    questions: Questions | None = None,
+    questions: HostQueries | None = None,
 ) -> CompiledExpression:
     """Resolves an expression against a scene.
 

@@ -11,8 +11,8 @@ import numpy as np
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates import logic
 from ig2mj.predicates.base import Context
+from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.logic import And, Atom, Exactly, Expression, Not, Or, Pairing
-from ig2mj.predicates.questions import Questions
 from ig2mj.states.world import ExtendedStates
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def truth_in(
 ) -> tuple[Context, dict[Atom, bool]]:
     """What one world is like, and which atoms of the expression hold in it."""
     states, view = jax.tree.map(lambda leaf: np.asarray(leaf)[world : world + 1], (states, view))
-    questions = compiled.questions or Questions.of(compiled.model)
+    questions = compiled.questions or HostQueries.of(compiled.model)
     context = Context(compiled.model, states, view, questions.relations(states, view))
     truth = np.asarray(compiled.literals.combine(questions.facts(compiled.literals, states, view), states.sliced))[0]
     table = dict(zip(compiled.atoms, truth.tolist(), strict=True))

@@ -8,8 +8,8 @@ import numpy as np
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates.compile import compile_expression
+from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.logic import And
-from ig2mj.predicates.questions import Questions
 from ig2mj.sampling.conditions import Condition
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates, WorldState
@@ -21,7 +21,7 @@ class Truths:
     def __init__(self, model: StateModel, conditions: Sequence[Condition]):
         """Compiles them. Raises what `compile_expression` raises."""
         self._goal = compile_expression(
-            model, And(tuple(c.atom for c in conditions)), strict=True, questions=Questions.of(model)
+            model, And(tuple(c.atom for c in conditions)), strict=True, questions=HostQueries.of(model)
         )
         place = {atom: i for i, atom in enumerate(self._goal.atoms)}
         self._place = {c: place[c.atom] for c in conditions}

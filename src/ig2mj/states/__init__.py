@@ -7,12 +7,14 @@ from ig2mj.process.public_names import offer_modules
 from ig2mj.states.initial import initial_states, states_of_manifest
 from ig2mj.states.model import StateModel
 from ig2mj.states.options import StateOptions
-from ig2mj.states.relations.plan import RelationPlan, Relations
+from ig2mj.states.relations.plan import PlannedRelations, RelationPlan
+from ig2mj.states.relations.relations import Relations
 from ig2mj.states.update import queries, update
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 
 __all__ = [
     "ExtendedStates",
+    "PlannedRelations",
     "RelationPlan",
     "Relations",
     "StateModel",

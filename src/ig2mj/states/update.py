@@ -28,7 +28,8 @@ from ig2mj.states.definitions import (
     wetness,
 )
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations.plan import Query, RelationPlan, Relations
+from ig2mj.states.relations.plan import Query, RelationPlan
+from ig2mj.states.relations.relations import Relations
 from ig2mj.states.spec import EventStep, HeatStep, StateSpec
 from ig2mj.states.swap import Swap
 

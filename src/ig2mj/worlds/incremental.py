@@ -33,7 +33,7 @@ from ig2mj.engine.base import Engine
 from ig2mj.engine.native.execution import HostFunction
 from ig2mj.engine.view import Array, PhysicsView, but_agents
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
-from ig2mj.predicates.questions import Questions
+from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.registry import find
 from ig2mj.states.definitions import toggled_on
 from ig2mj.states.model import StateModel
@@ -202,9 +202,9 @@ class _Goal:
 
     def __init__(self, goal: CompiledExpression | None, num_worlds: int):
         self._goal, self._none = goal, GoalStatus.empty(num_worlds)
-        self._questions: Questions | None = None
+        self._questions: HostQueries | None = None
         if goal is not None and num_worlds == 1 and len(set(goal.queries)) > MANY:
-            self._questions = Questions.of(goal.model)
+            self._questions = HostQueries.of(goal.model)
         self._status = HostFunction(self._status_fn)
 
     @staticmethod

@@ -17,8 +17,8 @@ import jax.numpy as jnp
 from ig2mj.engine.base import Write
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus, compile_expression
+from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.logic import Expression
-from ig2mj.predicates.questions import Questions
 from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import initial_states, states_of_manifest
@@ -86,12 +86,12 @@ class Rules:
     def compiled(self, expression: Expression | str, strict: bool = False) -> CompiledExpression:
         """An expression compiled for this scene; asked again soon, the same object. Raises as `compile_expression`.
 
-        Of a single world it is answered by programs that all expressions share (`ig2mj.predicates.questions`).
+        Of a single world it is answered by programs that all expressions share (`ig2mj.predicates.host_queries`).
         """
         key = (expression, strict)
         found = self._compiled.pop(key, None)
         if found is None:
-            found = compile_expression(self.model, expression, strict=strict, questions=Questions.of(self.model))
+            found = compile_expression(self.model, expression, strict=strict, questions=HostQueries.of(self.model))
         self._compiled[key] = found  # the one used last stands last
         if len(self._compiled) > KEPT_EXPRESSIONS:
             del self._compiled[next(iter(self._compiled))]

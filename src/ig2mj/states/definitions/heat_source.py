@@ -21,7 +21,8 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.definitions.open import is_open
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations.plan import Query, Relations
+from ig2mj.states.relations.plan import Query
+from ig2mj.states.relations.relations import Relations
 from ig2mj.states.spec import StateSpec
 
 if TYPE_CHECKING:

@@ -1,8 +1,8 @@
-"""Relations between named pairs of objects, each computed once per step for everyone who asks.
+"""Relations of pairs of objects that are known before tracing, each computed once a step.
 
-Heat sources ask what is inside them; predicates ask for inside, above and below, beside, distance. `RelationPlan`
-gathers the pairs before tracing; `Relations` holds the answers. iGibson remembers answers while two positions are the
-same, and goes stale when something turns, opens or closes; here all are computed in every step.
+Heat sources need what is inside them; predicates need inside, above and below, beside, distance. `RelationPlan`
+gathers the pairs before tracing; `PlannedRelations` holds the answers. All are computed in every step. (iGibson keeps
+answers while two positions are the same, which are wrong once something turns, opens or closes.)
 
 Axes: W worlds, P pairs of a kind, V answers of a pair.
 """
@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Literal
+from collections.abc import Iterable, Mapping
 
 import jax.numpy as jnp
 import numpy as np
@@ -24,46 +23,25 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.relations.adjacency import AdjacencyPairs
 from ig2mj.states.relations.containment import ContainerPairs
 from ig2mj.states.relations.nearness import NearPairs, boxes_near
+from ig2mj.states.relations.relations import ANSWERS, KINDS, Kind, Pairs, Relations
 
-Kind = Literal["inside", "vertical", "horizontal", "near"]
 Pair = tuple[int, int]
-Pairs = Iterable[Sequence[int]] | np.ndarray
 Query = tuple[Kind, int, int]
 """What is asked: kind, object, target. Answers: `Relations.inside`, `.above` with `.below`, `.beside`, `.near`."""
 
-KINDS: tuple[Kind, ...] = ("inside", "vertical", "horizontal", "near")
-
 
 @dataclasses.dataclass(frozen=True)
-class Relations:
-    """Answers of one step; arrays over the pairs asked for, in their order."""
+class PlannedRelations(Relations):
+    """Answers of one step to the pairs of a plan."""
 
     plan: RelationPlan
     values: dict[str, Bool[Array, "W P V"]]
 
-    def inside(self, pairs: Pairs) -> Bool[Array, "W P"]:
-        """Two orthogonal axes through the object meet the target on both sides."""
-        return self._of("inside", pairs)[..., 0]
-
-    def above(self, pairs: Pairs) -> Bool[Array, "W P"]:
-        """The target is above the object (InSamePositiveVerticalAxisObjs of the object)."""
-        return self._of("vertical", pairs)[..., 0]
-
-    def below(self, pairs: Pairs) -> Bool[Array, "W P"]:
-        """The target is below the object (InSameNegativeVerticalAxisObjs of the object)."""
-        return self._of("vertical", pairs)[..., 1]
-
-    def beside(self, pairs: Pairs) -> Bool[Array, "W P"]:
-        """A horizontal ray of the object enters the target (InSameHorizontalPlaneObjs of the object)."""
-        return self._of("horizontal", pairs)[..., 0]
-
-    def near(self, pairs: Pairs) -> Bool[Array, "W P"]:
-        """The object and the target are near each other (nearness.py)."""
-        return self._of("near", pairs)[..., 0]
-
-    def _of(self, kind: Kind, pairs: Pairs) -> Bool[Array, "W P V"]:
+    def answer(self, relation: str, pairs: Pairs) -> Bool[Array, "W P"]:
+        """See `Relations.answer`; of pairs of the plan."""
+        kind, number = ANSWERS[relation]
         where = [self.plan.index[kind][(int(a), int(b))] for a, b in pairs]
-        return self.values[kind][:, np.array(where, int)]
+        return self.values[kind][:, np.array(where, int), number]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -95,10 +73,10 @@ class RelationPlan:
             if pairs
         }
 
-    def evaluate(self, view: PhysicsView) -> Relations:
+    def evaluate(self, view: PhysicsView) -> PlannedRelations:
         """All answers, computed now."""
         values = {kind: self._compute(kind, view, self._gate(kind, view)) for kind in self._work}
-        return Relations(self, self._padded(values, view))
+        return PlannedRelations(self, self._padded(values, view))
 
     def _compute(self, kind: Kind, view: PhysicsView, needed: Bool[Array, "W P"]) -> Bool[Array, "W P V"]:
         """Answers where they are needed, false elsewhere."""

@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 from ig2mj.predicates import And, CompiledExpression, Expression, compile_expression
+from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.logic import Atom
-from ig2mj.predicates.questions import Questions
 from ig2mj.states.model import StateModel
 from ig2mj.tasks.bddl.binding import Binding
 from ig2mj.tasks.bddl.synsets import AGENT, FLOOR
@@ -31,11 +31,11 @@ class BoundConditions:
 
     def compile_goal(self, model: StateModel) -> CompiledExpression:
         """The goal: truth, fraction of progress, `explain`. Raises UnknownNameError: the scene lacks an addition."""
-        return compile_expression(model, And(self.goal), self.groups, questions=Questions.of(model))
+        return compile_expression(model, And(self.goal), self.groups, questions=HostQueries.of(model))
 
     def compile_init(self, model: StateModel) -> CompiledExpression:
         """The conditions of the start, likewise."""
-        return compile_expression(model, And(self.init), self.groups, questions=Questions.of(model))
+        return compile_expression(model, And(self.init), self.groups, questions=HostQueries.of(model))
 
 
 def conditions(binding: Binding) -> BoundConditions:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.predicates.compile import compile_expression
-from ig2mj.predicates.questions import Questions
+from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.sampling import many
 from ig2mj.sampling.conditions import Condition, read_conditions
 from ig2mj.sampling.many import Sampled
@@ -170,7 +170,7 @@ def row_status(binding: Binding, scene: Scene, pool: Pool, row: int) -> RowStatu
     query = SceneQuery(scene)
     model = StateModel.of_manifest(scene.tables, scene.manifest)
     world = world_of(query, load_row(query, pool, row))
-    bound, questions = conditions(binding), Questions.of(model)
+    bound, questions = conditions(binding), HostQueries.of(model)
     said = binding.activity.goal
     true = [compile_expression(model, part, bound.groups, questions=questions)(world)[0] for part in bound.goal]
     goal = bound.compile_goal(model)

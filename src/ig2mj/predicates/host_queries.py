@@ -1,4 +1,4 @@
-"""Questions from the host: one compiled program for each predicate of a scene, in which the arguments are data.
+"""HostQueries from the host: one compiled program for each predicate of a scene, in which the arguments are data.
 
 A goal of a batch is one fused program (`CompiledExpression.status`), compiled for its objects: the fastest step. Who
 asks about this book now and about that shelf next cannot wait for a compilation each time. Here a predicate is compiled
@@ -11,7 +11,7 @@ Axes: W worlds, N rows of arguments, K arguments of a predicate, I facts.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
@@ -27,7 +27,8 @@ from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.process.tracing import inputs_that_matter
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations.asked import AskedRelations, PieceTables
+from ig2mj.states.relations.relations import Pairs, Relations
+from ig2mj.states.relations.traced import PieceTables, TracedRelations
 from ig2mj.states.world import ExtendedStates
 
 ROWS = 64
@@ -42,12 +43,10 @@ if jax.__version_info__ < (0, 11):  # later versions lack the first
 SCENES = 8
 """Scenes whose programs are kept: those asked about last."""
 
-Pairs = Iterable[Sequence[int]] | np.ndarray
-
 VIEW, STATES = "view.", "states."
 
 
-class Questions:
+class HostQueries:
     """All predicates of a scene, each compiled when it is first asked about."""
 
     def __init__(self, model: StateModel, num_worlds: int = 1):
@@ -57,9 +56,9 @@ class Questions:
 
     @staticmethod
     @functools.lru_cache(maxsize=SCENES)
-    def of(model: StateModel) -> Questions:
+    def of(model: StateModel) -> HostQueries:
         """Those of a single world of a scene; asked again, the same object, for the last few scenes."""
-        return Questions(model)
+        return HostQueries(model)
 
     def facts(self, literals: Literals, states: ExtendedStates, view: PhysicsView) -> Bool[np.ndarray, "W I"]:
         """As `Literals.facts`: truth of every instance, and at the end one that is false."""
@@ -89,26 +88,15 @@ class Questions:
         return self._programs[predicate.name]
 
 
-class HostRelations:
-    """As `ig2mj.states.relations.plan.Relations`, for any pairs; a relation is a question as a predicate is."""
+class HostRelations(Relations):
+    """Relations of any pairs; a relation is a query as a predicate is."""
 
-    def __init__(self, questions: Questions, states: ExtendedStates, view: PhysicsView):
-        self._ask = functools.partial(questions.holds, states=states, view=view)
+    def __init__(self, queries: HostQueries, states: ExtendedStates, view: PhysicsView):
+        self._ask = functools.partial(queries.holds, states=states, view=view)
 
-    def inside(self, pairs: Pairs) -> Bool[np.ndarray, "W P"]:
-        return self._ask(_relation("inside"), _rows(pairs))
-
-    def above(self, pairs: Pairs) -> Bool[np.ndarray, "W P"]:
-        return self._ask(_relation("above"), _rows(pairs))
-
-    def below(self, pairs: Pairs) -> Bool[np.ndarray, "W P"]:
-        return self._ask(_relation("below"), _rows(pairs))
-
-    def beside(self, pairs: Pairs) -> Bool[np.ndarray, "W P"]:
-        return self._ask(_relation("beside"), _rows(pairs))
-
-    def near(self, pairs: Pairs) -> Bool[np.ndarray, "W P"]:
-        return self._ask(_relation("near"), _rows(pairs))
+    def answer(self, relation: str, pairs: Pairs) -> Bool[np.ndarray, "W P"]:
+        """See `Relations.answer`."""
+        return self._ask(_relation(relation), [tuple(int(i) for i in pair) for pair in pairs])
 
 
 @functools.cache
@@ -116,12 +104,8 @@ def _relation(name: str) -> Predicate:
     return Predicate(
         name=f"relation {name}",
         arguments=("object", "object"),
-        evaluate=lambda context, pairs: getattr(context.relations, name)(pairs),
+        evaluate=lambda context, pairs: context.relations.answer(name, pairs),
     )
-
-
-def _rows(pairs: Pairs) -> list[tuple[int, ...]]:
-    return [tuple(int(i) for i in pair) for pair in pairs]
 
 
 class _Program:
@@ -159,7 +143,7 @@ class _Program:
         named = dict(zip(self._shapes, leaves, strict=True))
         states = jax.tree.unflatten(self._structure, [named[name] for name in self._states])
         view = assemble({name: named[VIEW + name] for name in SCHEMA})
-        context = Context(self._tables.model, states, view, AskedRelations(self._tables, view))
+        context = Context(self._tables.model, states, view, TracedRelations(self._tables, view))
 
         def answer(i: Int[Array, ""], found: Bool[Array, "W N"]) -> Bool[Array, "W N"]:
             row = jax.lax.dynamic_slice_in_dim(rows, i, 1)

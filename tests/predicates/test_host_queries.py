@@ -1,4 +1,4 @@
-"""Questions with arguments as data answer as goals compiled for their objects do; agents; fixed furniture."""
+"""HostQueries with arguments as data answer as goals compiled for their objects do; agents; fixed furniture."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from hand_world import HandWorld, Item, shell
 from ig2mj.engine.view import SCHEMA, PhysicsView, assemble, read_field
 from ig2mj.errors import Ig2mjError
 from ig2mj.predicates import PREDICATES, compile_expression, find
+from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.logic import And, atom
-from ig2mj.predicates.questions import Questions
 from ig2mj.states import initial_states
 from ig2mj.states.world import WorldState
 
@@ -61,7 +61,7 @@ def test_questions_and_goals_agree_on_every_pair_of_a_cluttered_scene(compat):
     pairs = [(a, b) for a in names for b in names if a != b]
     goal = compile_expression(model, And(tuple(atom(r, a, b) for r in RELATIONS for a, b in pairs)))
     fused = jax.jit(lambda states, view: goal.status(states, view).literals)
-    questions, states = Questions(model), initial_states(model, 1)
+    questions, states = HostQueries(model), initial_states(model, 1)
     seen: set[tuple[str, bool]] = set()
     rng = np.random.default_rng(1)
     for seed in range(6):
@@ -82,7 +82,7 @@ def test_questions_and_goals_agree_on_every_pair_of_a_cluttered_scene(compat):
 
 def test_one_program_serves_all_pairs_and_many_rows_at_once():
     model = HOME.model()
-    questions, states, view = Questions(model), initial_states(model, 1), _cluttered(0)
+    questions, states, view = HostQueries(model), initial_states(model, 1), _cluttered(0)
     rows = [(a, b) for a in range(len(HOME.index)) for b in range(len(HOME.index))]  # more than a program takes
     together = questions.holds(PREDICATES["under"], rows, states, view)
     single = [questions.holds(PREDICATES["under"], [row], states, view)[0, 0] for row in rows]
@@ -91,7 +91,7 @@ def test_one_program_serves_all_pairs_and_many_rows_at_once():
 
 
 def test_what_a_predicate_reads_is_found_by_tracing():
-    questions = Questions(HOME.model())
+    questions = HostQueries(HOME.model())
     assert questions.reads(PREDICATES["cooked"]) == ("states.max_temperature",)
     assert set(questions.reads(PREDICATES["in_contact_with"])) == {"view.object_com", "view.touching"}
     on_top = {"object_com", "aabb_low", "aabb_high", "body_pos", "body_quat", "touching"}
@@ -112,7 +112,7 @@ def test_a_single_world_is_answered_as_a_batch_is():
     )
     text = "(or (not (under ball_0 rack)) (and (on_top ball_1 slab) (next_to ball_2 crate)))"
     fused = compile_expression(model, text)
-    asked = compile_expression(model, text, questions=Questions(model))
+    asked = compile_expression(model, text, questions=HostQueries(model))
     assert fused(world)[0] == asked(world)[0]
     assert fused.fraction(world)[0] == asked.fraction(world)[0]
     assert np.asarray(fused.literals_of(world)).tolist() == asked.literals_of(world).tolist()
@@ -128,7 +128,7 @@ def test_contact_with_an_agent_by_its_name(text):
     for name, expected in (("ball", False), ("cup", True)):
         goal = compile_expression(model, text.format(name))
         assert bool(goal.status(states, view).holds[0]) == expected
-        assert Questions(model).facts(goal.literals, states, view)[0, 0] == expected
+        assert HostQueries(model).facts(goal.literals, states, view)[0, 0] == expected
     assert not compile_expression(model, "(in_contact_with ball cup)").status(states, view).holds[0]
 
 

@@ -1,9 +1,8 @@
-"""Relations of pairs that are not known while tracing: what questions from the host are answered with.
+"""Relations of pairs that are not known before tracing, for queries of the host.
 
 A goal's pairs are laid out before tracing (`plan.py`), which is fastest to run and slow to compile. Here a pair is two
-numbers, and the pieces it needs are slices of tables of the whole scene; so one compiled program serves every pair. The
-formulas are those of `adjacency.py`, `containment.py` and `nearness.py`. Pairs that the boxes rule out cost next to
-nothing.
+numbers, and the pieces that it needs are slices of tables of the whole scene, so that one compiled program serves every
+pair. Pairs that the boxes rule out cost next to nothing.
 
 Axes: W worlds, P pairs.
 """
@@ -25,7 +24,8 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.relations.adjacency import AdjacencyPairs
 from ig2mj.states.relations.containment import surrounded
 from ig2mj.states.relations.nearness import NearPairs, pieces_of
-from ig2mj.states.relations.plan import Kind, gate
+from ig2mj.states.relations.plan import gate
+from ig2mj.states.relations.relations import ANSWERS, Kind, Relations
 
 PLANES_AT_ONCE = 8
 """Half-spaces in each turn of a loop (`ig2mj.geometry.rays.clip_line`): one pair is little work."""
@@ -49,32 +49,17 @@ class PieceTables:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class AskedRelations:
-    """As `plan.Relations`, for pairs that may be traced; everything is computed where it is asked for."""
+class TracedRelations(Relations):
+    """Relations of pairs that may be traced; everything is computed where it is asked for."""
 
     tables: PieceTables
     view: PhysicsView
     _done: dict[tuple[Kind, int], tuple[Array, Array]] = dataclasses.field(default_factory=dict)  # with the pairs
 
-    def inside(self, pairs: Int[AnyArray, "P 2"]) -> Bool[Array, "W P"]:
-        """Two orthogonal axes through the object meet the target on both sides."""
-        return self._each("inside", pairs)[..., 0]
-
-    def above(self, pairs: Int[AnyArray, "P 2"]) -> Bool[Array, "W P"]:
-        """The target is above the object."""
-        return self._each("vertical", pairs)[..., 0]
-
-    def below(self, pairs: Int[AnyArray, "P 2"]) -> Bool[Array, "W P"]:
-        """The target is below the object."""
-        return self._each("vertical", pairs)[..., 1]
-
-    def beside(self, pairs: Int[AnyArray, "P 2"]) -> Bool[Array, "W P"]:
-        """A horizontal ray of the object enters the target."""
-        return self._each("horizontal", pairs)[..., 0]
-
-    def near(self, pairs: Int[AnyArray, "P 2"]) -> Bool[Array, "W P"]:
-        """The object and the target are near each other."""
-        return self._each("near", pairs)[..., 0]
+    def answer(self, relation: str, pairs: Int[AnyArray, "P 2"]) -> Bool[Array, "W P"]:
+        """See `Relations.answer`."""
+        kind, number = ANSWERS[relation]
+        return self._each(kind, pairs)[..., number]
 
     def _each(self, kind: Kind, pairs: Int[AnyArray, "P 2"]) -> Bool[Array, "W P 2"]:
         """One or two answers of each pair, one pair after the other."""
@@ -90,11 +75,11 @@ class AskedRelations:
         possible = gate(kind, self.view, pair)
 
         def compute() -> Bool[Array, "W 2"]:
-            return possible & self.computed(kind, pair, possible)
+            return possible & self._computed(kind, pair, possible)
 
         return jax.lax.cond(jnp.any(possible), compute, lambda: jnp.zeros((len(possible), 2), bool))
 
-    def computed(self, kind: Kind, pair: Int[Array, "1 2"], needed: Bool[Array, "W 1"]) -> Bool[Array, "W 2"]:
+    def _computed(self, kind: Kind, pair: Int[Array, "1 2"], needed: Bool[Array, "W 1"]) -> Bool[Array, "W 2"]:
         """One or two answers of one pair, which count where they are needed."""
         model, view = self.tables.model, self.view
         if kind == "near":
