@@ -1,4 +1,4 @@
-"""HostQueries with arguments as data answer as goals compiled for their objects do; agents; fixed furniture."""
+"""Queries with arguments as data answer as goals compiled for their objects do; agents; fixed furniture."""
 
 from __future__ import annotations
 

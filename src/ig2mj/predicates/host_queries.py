@@ -1,9 +1,9 @@
-"""HostQueries from the host: one compiled program for each predicate of a scene, in which the arguments are data.
+"""Queries of the host: one compiled program for each predicate of a scene, in which the arguments are data.
 
-A goal of a batch is one fused program (`CompiledExpression.status`), compiled for its objects: the fastest step. Who
-asks about this book now and about that shelf next cannot wait for a compilation each time. Here a predicate is compiled
-once for a scene and number of worlds, at its first question; every further pair is a call. Both evaluate the
-same `Predicate.evaluate`.
+A goal of a batch is one fused program (`CompiledExpression.status`), compiled for its objects, which makes the fastest
+step. A host that asks about one object after another would compile such a program each time. Here a predicate is
+compiled once for a scene and a number of worlds, at its first query; each further pair is a call. Both evaluate
+`Predicate.evaluate`.
 
 Axes: W worlds, N rows of arguments, K arguments of a predicate, I facts.
 """
@@ -47,7 +47,7 @@ VIEW, STATES = "view.", "states."
 
 
 class HostQueries:
-    """All predicates of a scene, each compiled when it is first asked about."""
+    """All predicates of a scene, each compiled at its first query."""
 
     def __init__(self, model: StateModel, num_worlds: int = 1):
         self.model, self.num_worlds = model, num_worlds
