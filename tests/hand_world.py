@@ -29,7 +29,7 @@ from ig2mj.states import (
     WorldState,
     update,
 )
-from ig2mj.states.parameters import Part
+from ig2mj.states.parameters import Part, make_parameters
 
 UNIT_CUBE = (((0.0, 0.0, 0.0), (0.5, 0.5, 0.5)),)
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
@@ -101,7 +101,9 @@ class HandWorld:
             for t in self.things
             for half, offset in t.parts.items()
         ]
-        return StateModel.of_abilities(self.tables, [t.abilities for t in self.things], parts, StateOptions(**options))
+        chosen = StateOptions(**options)
+        abilities = [thing.abilities for thing in self.things]
+        return StateModel(self.tables, make_parameters(self.tables, abilities, parts, chosen.compat), chosen)
 
     def view(
         self,

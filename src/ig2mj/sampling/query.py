@@ -1,8 +1,8 @@
 """`SceneQuery`: questions about one scene that need physics or collision geometry, answered by the native engine.
 
-Where are surfaces (`level`), what does a ray meet (`rays`), how deep do objects penetrate others
-(`penetration`), where does everything come to rest (`settle`)? Samplers and calibration ask; nothing above this package
-touches MuJoCo's data for them.
+Where are surfaces (`level`), what does a ray meet (`rays`), how deep do objects penetrate others (`penetrations`),
+where does everything come to rest (`settle`)? Samplers and calibration ask; nothing above this package touches
+MuJoCo's data for them.
 
 Axes: W worlds, N candidates or rays, O objects.
 """

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Int
@@ -12,7 +11,7 @@ from jaxtyping import Int
 from ig2mj.scene.manifest import Manifest
 from ig2mj.scene.tables import LinkKind, SceneTables
 from ig2mj.states.options import StateOptions
-from ig2mj.states.parameters import Abilities, Part, StateParameters, make_parameters, parameters_of_manifest
+from ig2mj.states.parameters import StateParameters, parameters_of_manifest
 
 DEFAULTS = StateOptions()
 
@@ -29,17 +28,6 @@ class StateModel:
     def of_manifest(cls, tables: SceneTables, manifest: Manifest, options: StateOptions = DEFAULTS) -> StateModel:
         """The model of a loaded scene."""
         return cls(tables, parameters_of_manifest(manifest, tables, options.compat), options)
-
-    @classmethod
-    def of_abilities(
-        cls,
-        tables: SceneTables,
-        abilities: Sequence[Abilities],
-        parts: Sequence[Part] = (),
-        options: StateOptions = DEFAULTS,
-    ) -> StateModel:
-        """The model of objects whose abilities are given, one mapping per object."""
-        return cls(tables, make_parameters(tables, abilities, parts, options.compat), options)
 
     @property
     def paper(self) -> bool:

@@ -203,14 +203,6 @@ def slots(owner: np.ndarray, count: int) -> np.ndarray:
     return table
 
 
-def _any_over_slots(values: Bool[Array, "W U X"], slot: np.ndarray) -> Bool[Array, "W O X"]:
-    """Whether any of an object's rows holds; slot by slot, so that no [W, O, S, X] array is made."""
-    result = values[:, slot[:, 0]] & (slot[:, 0] >= 0)[:, None]
-    for s in range(1, slot.shape[1]):
-        result |= values[:, slot[:, s]] & (slot[:, s] >= 0)[:, None]
-    return result
-
-
 def _any_of(values: Bool[Array, "W T"], owned: np.ndarray) -> Bool[Array, "W O"]:
     """Whether any tree an object owns [O, T] holds."""
     table = [np.flatnonzero(row) for row in owned]
