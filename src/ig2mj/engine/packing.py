@@ -17,8 +17,8 @@ import numpy as np
 from jax.extend.core import ClosedJaxpr, jaxpr_as_fun
 
 from ig2mj.engine.view import Array
-from ig2mj.process.one_kernel import OneKernel
 from ig2mj.process.tracing import inputs_that_matter
+from ig2mj.process.xla_small_call import SmallCall
 
 LARGEST = 1 << 14
 """Numbers of an array that is worth a copy."""
@@ -102,7 +102,7 @@ class PackedFunction:
             return self._made.traced(function(*inputs))
 
         packed.__name__ = name
-        self.call = (OneKernel if small else jax.jit)(packed, compiler_options=options)
+        self.call = (SmallCall if small else jax.jit)(packed, compiler_options=options)
 
     def __call__(self, arrays: Sequence[Array]) -> list[Any]:
         """All results of the arguments at `takes`."""

@@ -128,7 +128,7 @@ def _best(parts: Sequence[Expression], truth: Truth, wanted: bool) -> Score:
 def _sum_of_best(values: Float[Array, "N W"], count: int) -> Float[Array, "W"]:
     xp = values.__array_namespace__()
     first = np.arange(len(values))
-    earlier = first[:, None] < first  # of equal values the earlier counts as better; no sort, see `one_kernel`
+    earlier = first[:, None] < first  # of equal values the earlier counts as better; no sort, see `xla_small_call`
     better = (values[:, None] > values) | ((values[:, None] == values) & earlier[..., None])
     return xp.sum(xp.where(xp.sum(better, axis=0) < count, values, xp.zeros_like(values)), axis=0)
 

@@ -1,7 +1,7 @@
 """Working off in turns what a mask chooses: which places come next, and putting the answers where they belong.
 
 Without scatters where that can be: XLA compiles each into kernels of its own, and no program with one into a single
-function (`ig2mj.process.one_kernel`).
+function (`ig2mj.process.xla_small_call`).
 
 Axes: M places, N places of a turn.
 """

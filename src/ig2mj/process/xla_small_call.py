@@ -1,4 +1,4 @@
-"""`one_kernel`: a program for one processor core, all of whose operations are compiled into a single function.
+"""`SmallCall`: a program for one processor core, all of whose operations are compiled into a single function.
 
 XLA's programs for processors are lists of small kernels, handed to a pool of threads. For the states of one world, some
 fifty kernels of a few hundred numbers each, handing them over takes longer than the work, and compiling fifty kernels
@@ -7,6 +7,9 @@ as one function, as it does by itself with small loops; a backend that does not 
 Sorts, scatters of many numbers, and operations large enough to be split between threads cannot be compiled that way: a
 program with such an operation is compiled as usual when it is first called. XLA prints an error of its own when it
 finds that out, so that for the first of these it is not asked.
+
+The first agent step of CookingMeat in one world takes 5.8 s of processor time instead of 8.2, a later one 7 % less
+(docs/notes/native.md).
 """
 
 from __future__ import annotations
@@ -24,13 +27,13 @@ ATTRIBUTES = {"inlineable": "false", "xla_cpu_small_call": "true"}
 NO_LIBRARY: Options = {"xla_cpu_experimental_ynn_fusion_type": "LIBRARY_FUSION_TYPE_INDIVIDUAL_CONVOLUTION"}
 """Of a library's kernels none but convolutions, of which we have none: its calls cannot be part of a function."""
 
-APART = {"sort", "top_k"}
+NOT_IN_ONE_FUNCTION = {"sort", "top_k"}
 """Operations of JAX that XLA hands to functions of its runtime."""
 
 LOG = logging.getLogger("ig2mj.process")
 
 
-class OneKernel:
+class SmallCall:
     """A compiled function; see the module. On other backends than the processor it is JAX's own."""
 
     def __init__(self, function: Callable[..., Any], compiler_options: Mapping[str, int | bool | str] | None = None):
@@ -59,7 +62,7 @@ class OneKernel:
         possible = jax.default_backend() == "cpu" and any(leaf.size for leaf in jax.tree.leaves(arguments))
         for options in (NO_LIBRARY, {}) if possible else ():
             call = jax.jit(_as_one(self._function), compiler_options={**self._options, **options})
-            if APART & _operations(call.trace(*arguments).jaxpr.jaxpr):
+            if NOT_IN_ONE_FUNCTION & _operations(call.trace(*arguments).jaxpr.jaxpr):
                 break
             try:
                 made = call(*arguments)[0]
