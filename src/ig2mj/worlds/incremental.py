@@ -10,7 +10,8 @@ engines, with the states and the view of each control step. Three facts decide w
 - All of a step is a pure function of the states and the view. Where both are those of the last step and the last step
   changed no state, its outcome is returned.
 - The first part of a step (`states.update.events`) reads no temperature. Where the view is that of the last whole step,
-  which changed nothing but temperatures, only the second part (`states.update.heat`) and the goal run.
+  which changed nothing but temperatures, only the second part (`states.update.heat`) runs, and the goal where it
+  depends on what that changed.
 - The native engine marks views between which nothing but agents moved (`engine.view.but_agents`). Such a view counts as
   the same, unless the states or the goal read what differs. Fingers count as the same while all are out of reach of all
   buttons.
@@ -36,6 +37,7 @@ from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.registry import find
 from ig2mj.states.definitions import toggled_on
+from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
 from ig2mj.states.update import HEAT_FIELDS, events, heat, queries
@@ -91,8 +93,10 @@ class IncrementalRules:
             return self._whole_step(states, view)
         if self._settled:
             return last
-        states, self._settled = self._programs.heat(states, self._acts, view)
-        self._last = Outcome(states, None, self._goal(view, states))
+        states, changed = self._programs.heat(states, self._acts, view)
+        self._settled = not changed
+        status = last.status if self._goal.heat_reads.isdisjoint(changed) else self._goal(view, states)
+        self._last = Outcome(states, None, status)
         return self._last
 
     def _whole_step(self, states: ExtendedStates, view: PhysicsView) -> Outcome:
@@ -164,10 +168,11 @@ class _StatePrograms:
         quiet, settled, swapped = np.asarray(flags).tolist()
         return _Step(jax.tree.unflatten(structure, leaves), Swap(*swap) if swapped else None, acts, quiet, settled)
 
-    def heat(self, states: ExtendedStates, acts: Array, view: PhysicsView) -> tuple[ExtendedStates, bool]:
-        """The second part of `update`, and whether it changed nothing."""
+    def heat(self, states: ExtendedStates, acts: Array, view: PhysicsView) -> tuple[ExtendedStates, list[str]]:
+        """The second part of `update`, and the fields of the states that it changed."""
         made, same = self._heat(view, states, acts)
-        return states.replace(**dict(zip(HEAT_FIELDS, made, strict=True))), bool(same)
+        changed = [name for name, kept in zip(HEAT_FIELDS, same.tolist(), strict=True) if not kept]
+        return states.replace(**dict(zip(HEAT_FIELDS, made, strict=True))), changed
 
     def _rules_fn(self, view: PhysicsView, states: ExtendedStates) -> tuple[Any, ...]:
         after, swap, acts = events(self.model, states, view, self._plan.evaluate(view))
@@ -180,7 +185,8 @@ class _StatePrograms:
 
     def _heat_fn(self, view: PhysicsView, states: ExtendedStates, acts: Array) -> tuple[list[Any], Array]:
         new = heat(self.model, states, acts, view.touching)
-        return [getattr(new, name) for name in HEAT_FIELDS], _are_same(states, new)
+        same = [jnp.all(getattr(states, name) == getattr(new, name)) for name in HEAT_FIELDS]
+        return [getattr(new, name) for name in HEAT_FIELDS], jnp.stack(same)
 
 
 def _are_same(one: ExtendedStates, other: ExtendedStates) -> Bool[Array, ""]:
@@ -227,6 +233,18 @@ class _Goal:
             return any(map(_is_of_agents, self._status.reads))
         reads = (self._questions.reads(find(name)) for name in self._goal.literals.instances)
         return any(name.startswith("view.agent.") for names in reads for name in names)
+
+    @functools.cached_property
+    def heat_reads(self) -> frozenset[str]:
+        """Fields that `heat` changes on which it depends; known after the first call."""
+        if self._goal is None:
+            return frozenset()
+        if self._questions is not None:
+            reads = (self._questions.reads(find(name)) for name in self._goal.literals.instances)
+            return frozenset(name for names in reads for name in HEAT_FIELDS if f"states.{name}" in names)
+        paths, _ = jax.tree_util.tree_flatten_with_path(initial_states(self._goal.model, 1))
+        names = [path[0].name for path, _ in paths]  # leaf 0 of the arguments is the view
+        return frozenset(names[leaf - 1] for leaf in self._status.takes).intersection(HEAT_FIELDS)
 
     def _status_fn(self, view: PhysicsView, states: ExtendedStates) -> tuple[Array, Array, Array]:
         assert self._goal is not None

@@ -126,6 +126,12 @@ class HostFunction:
         """Fields of views on which results depend, of all programs so far."""
         return frozenset[str]().union(*(program.reads for program in self._programs.values()))
 
+    @property
+    def takes(self) -> frozenset[int]:
+        """Numbers of the other leaves of the arguments on which results depend, of all programs so far; a view is one
+        leaf."""
+        return frozenset(i for program in self._programs.values() for i, read in program.takes if read is None)
+
     def _cache_size(self) -> int:
         """How many programs are compiled; JAX's own functions have this name for it."""
         return sum(program.function.call._cache_size() for program in self._programs.values())  # pyright: ignore
