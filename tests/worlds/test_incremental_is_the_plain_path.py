@@ -22,7 +22,7 @@ from ig2mj.scene import manifest as mf
 from ig2mj.states import initial_states
 from ig2mj.states.definitions.dust import DUST
 from ig2mj.worlds import Core, Rules
-from ig2mj.worlds.incremental import MANY, IncrementalRules
+from ig2mj.worlds.incremental import AHEAD, MANY, IncrementalRules
 
 STORY: list[tuple] = [
     ("step", 6),
@@ -206,7 +206,7 @@ def test_a_settled_world_is_left_alone_and_a_cooling_one_is_not(monkeypatch):
     again, _, status = stepper.step(states, VIEWS[0])
     assert again is states and not status.holds[0]
     states = states.replace(temperature=jnp.asarray(states.temperature).at[0, 1].set(80.0))
-    for _ in range(6):
+    for _ in range(2 * AHEAD + 3):
         done, expected = stepper.step(states, VIEWS[0]), reference(states, VIEWS[0])
         _assert_same(done, expected, "cooling")
         assert done.states.temperature[0, 1] < states.temperature[0, 1] and done.status.holds[0]

@@ -22,7 +22,7 @@ Axes: W worlds, O objects, S heat sources, L literals.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import jax
@@ -49,6 +49,10 @@ FINGERS = "agent.finger_pos"
 MANY = 24
 """Relations of a goal from which on one world asks the host's questions."""
 
+AHEAD = 16
+"""Steps of temperatures that one call computes: a call takes 40 us, and what it computes hardly counts. Steps that
+something overtakes are discarded."""
+
 SCENES = 8
 """Scenes, and goals, whose programs are kept: those stepped last."""
 
@@ -72,6 +76,7 @@ class IncrementalRules:
         self._last: Outcome | None = None
         self._acts: Array | None = None  # of the last whole step; None: the next step is a whole one
         self._settled = False  # the last step changed no state
+        self._ahead: Iterator[_Heat] = iter(())  # the next steps of temperatures
         self._view: PhysicsView | None = None
         self._fingers_away: bool | None = None  # in `_view`; None: not looked at
 
@@ -93,15 +98,19 @@ class IncrementalRules:
             return self._whole_step(states, view)
         if self._settled:
             return last
-        states, changed = self._programs.heat(states, self._acts, view)
-        self._settled = not changed
+        after = next(self._ahead, None)
+        if after is None:
+            self._ahead = self._programs.heat(states, self._acts, view)
+            after = next(self._ahead)
+        fields, changed = after
+        states, self._settled = states.replace(**fields), not changed
         status = last.status if self._goal.heat_reads.isdisjoint(changed) else self._goal(view, states)
         self._last = Outcome(states, None, status)
         return self._last
 
     def _whole_step(self, states: ExtendedStates, view: PhysicsView) -> Outcome:
         done = self._programs.step(states, view)
-        self._view, self._fingers_away = view, None
+        self._view, self._fingers_away, self._ahead = view, None, iter(())
         self._acts, self._settled = done.acts if done.quiet else None, done.settled
         self._last = Outcome(done.states, None, self._goal(view, done.states))
         return self._last._replace(swap=done.swap)
@@ -123,6 +132,10 @@ class IncrementalRules:
                 return False
         self._view = view
         return True
+
+
+_Heat = tuple[dict[str, Array], list[str]]
+"""A step of temperatures: fields of the states after it, and the names of those that it changed."""
 
 
 class _Step(NamedTuple):
@@ -168,11 +181,13 @@ class _StatePrograms:
         quiet, settled, swapped = np.asarray(flags).tolist()
         return _Step(jax.tree.unflatten(structure, leaves), Swap(*swap) if swapped else None, acts, quiet, settled)
 
-    def heat(self, states: ExtendedStates, acts: Array, view: PhysicsView) -> tuple[ExtendedStates, list[str]]:
-        """The second part of `update`, and the fields of the states that it changed."""
+    def heat(self, states: ExtendedStates, acts: Array, view: PhysicsView) -> Iterator[_Heat]:
+        """The second part of `update` in each of the next steps, as long as nothing else changes: its fields of the
+        states, and the names of those that it changed."""
         made, same = self._heat(view, states, acts)
-        changed = [name for name, kept in zip(HEAT_FIELDS, same.tolist(), strict=True) if not kept]
-        return states.replace(**dict(zip(HEAT_FIELDS, made, strict=True))), changed
+        for k, kept in enumerate(same.tolist()):
+            changed = [name for name, is_same in zip(HEAT_FIELDS, kept, strict=True) if not is_same]
+            yield {name: steps[k] for name, steps in zip(HEAT_FIELDS, made, strict=True)}, changed
 
     def _rules_fn(self, view: PhysicsView, states: ExtendedStates) -> tuple[Any, ...]:
         after, swap, acts = events(self.model, states, view, self._plan.evaluate(view))
@@ -184,9 +199,14 @@ class _StatePrograms:
         return [made[i] for i in self._changed], (swap.mask, swap.pos, swap.quat), acts, flags
 
     def _heat_fn(self, view: PhysicsView, states: ExtendedStates, acts: Array) -> tuple[list[Any], Array]:
-        new = heat(self.model, states, acts, view.touching)
-        same = [jnp.all(getattr(states, name) == getattr(new, name)) for name in HEAT_FIELDS]
-        return [getattr(new, name) for name in HEAT_FIELDS], jnp.stack(same)
+        def step(before: list[Array], _: None) -> tuple[list[Array], tuple[list[Array], Array]]:
+            now = states.replace(**dict(zip(HEAT_FIELDS, before, strict=True)))
+            new = heat(self.model, now, acts, view.touching)
+            after: list[Array] = [getattr(new, name) for name in HEAT_FIELDS]
+            same = jnp.stack([jnp.all(a == b) for a, b in zip(before, after, strict=True)])
+            return after, (after, same)
+
+        return jax.lax.scan(step, [jnp.asarray(getattr(states, name)) for name in HEAT_FIELDS], None, AHEAD)[1]
 
 
 def _are_same(one: ExtendedStates, other: ExtendedStates) -> Bool[Array, ""]:
