@@ -233,7 +233,7 @@ def but_agents(view: PhysicsView) -> object | None:
 
 
 def read_fields(view: PhysicsView, names: tuple[str, ...]) -> list[Array]:
-    """The arrays at some paths of `SCHEMA`, in one go: natively every microsecond counts."""
+    """The arrays at some paths of `SCHEMA`."""
     return [getter(view) for getter in _getters(names)]
 
 

@@ -23,7 +23,7 @@ def dirty(name: str, dirt: Dirt) -> Predicate:
         rows = np.zeros(objects, int)
         rows[having] = np.arange(len(having))
         levels = dirt.is_dirty(model, getattr(states, dirt.name))
-        return jnp.asarray(levels)[:, rows]  # of objects without rows nobody asks
+        return jnp.asarray(levels)[:, rows]  # never read for objects without rows
 
     def why(context: Context, arguments: tuple[int, ...], world: int) -> str:
         row, rows = dirt.row_of(context.model, arguments[0]), getattr(context.states, dirt.name)

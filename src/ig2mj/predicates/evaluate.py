@@ -44,7 +44,7 @@ class Truth:
 
 
 class Score(NamedTuple):
-    """How near an expression is to being as wanted, 0 to 1, and for how many literals that counts."""
+    """How near an expression is to its desired truth, 0 to 1, and for how many literals that counts."""
 
     value: Float[Array, "W"]
     weight: float

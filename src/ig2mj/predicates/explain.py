@@ -83,7 +83,7 @@ def pairs_found(rows, table: dict[Atom, bool]) -> tuple[int, int]:
 
 
 def _missing(e: Expression, table: dict[Atom, bool], wanted: bool, reason, lines: list[str], indent: str) -> None:
-    """Adds lines about `e`, which is not as wanted."""
+    """Adds lines about `e`, whose truth is not the desired one."""
     if value_of(e, table) == wanted:
         return
     match e:

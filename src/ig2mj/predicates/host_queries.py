@@ -32,16 +32,16 @@ from ig2mj.states.relations.traced import PieceTables, TracedRelations
 from ig2mj.states.world import ExtendedStates
 
 ROWS = 64
-"""Rows of arguments that a program takes at a time; rows in use cost time, the others do not."""
+"""Rows of arguments in one call; only rows in use cost time."""
 
 COMPILED_FAST: dict[str, int | bool] = {"xla_backend_optimization_level": 0}
-"""XLA's options on a CPU: ready in 40 % of the time; a call takes tenths of a millisecond all the same."""
+"""XLA's options on a CPU: compiled in 40 % of the time; a call takes tenths of a millisecond either way."""
 if jax.__version_info__ < (0, 11):  # later versions lack the first
     # One part, not 32 with a copy each of all that is declared: 13 % less, on the wall of two cores, too.
     COMPILED_FAST |= {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": 1}
 
 SCENES = 8
-"""Scenes whose programs are kept: those asked about last."""
+"""Scenes whose programs are kept: those used last."""
 
 VIEW, STATES = "view.", "states."
 
@@ -57,7 +57,7 @@ class HostQueries:
     @staticmethod
     @functools.lru_cache(maxsize=SCENES)
     def of(model: StateModel) -> HostQueries:
-        """Those of a single world of a scene; asked again, the same object, for the last few scenes."""
+        """Those of a single world of a scene; the same object each time, for the last few scenes."""
         return HostQueries(model)
 
     def facts(self, literals: Literals, states: ExtendedStates, view: PhysicsView) -> Bool[np.ndarray, "W I"]:

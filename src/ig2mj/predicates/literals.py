@@ -1,8 +1,8 @@
 """Literals: predicates of named objects, resolved against a scene and evaluated together.
 
 Names become indices here, once, with typed errors. An object without the ability a predicate asks for answers False,
-with one warning, or is an error with `strict`. A whole that has been sliced is stood for by its halves: a predicate of
-it holds when it holds for all of them; with it as the second argument, when it holds for any (in iGibson that raises).
+with one warning, or is an error with `strict`. The halves of a sliced object stand in for it: a predicate of it
+holds if it holds for all halves; with it as the second argument, if it holds for any (iGibson raises an error).
 
 Axes: W worlds, L literals.
 """

@@ -21,8 +21,8 @@ class Part:
 
     Attributes:
       text: the literal, or what its parts have to do ("all of", "one of"). literal: it has no parts.
-      holds: its truth. wanted: the truth that would make the whole hold. why: numbers behind a literal that is not as
-      wanted, else "". parts: of which it is made.
+      holds: its truth. wanted: the truth that would make the whole hold. why: numbers behind a literal that does not
+      have it, else "". parts: of which it consists.
     """
 
     text: str

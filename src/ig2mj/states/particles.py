@@ -31,7 +31,7 @@ NUM_PARTICLES = 20
 
 MIN_PLACED = {"paper": NUM_PARTICLES, "igibson": 5}
 """Fewer placed particles than this are a failure that leaves the object clean: the paper's number is fixed (table A.5),
-iGibson's code puts up with five (docs/design/rules.md#placed)."""
+iGibson's code accepts five (docs/design/rules.md#placed)."""
 
 DUST_RADIUS = 0.0075
 """Metres. Dust is drawn as spheres of 15 mm, half sunk into the surface (iGibson's particles.py)."""

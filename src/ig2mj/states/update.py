@@ -1,8 +1,8 @@
 """The one order in which extended states are updated after physics (iGibson's simulator.py): `EVENTS`, then `HEAT`.
 
-A state that depends on another sees this step's value of it, but for water: a tap that is switched on in this step lets
-the first drop go in the next, as in iGibson. Which heat source acts on what is found between the two parts; a caller
-that knows that nothing has happened since the last step may run `heat` alone.
+A state that depends on another reads this step's value of it, except for water: a tap that is switched on in this step
+releases the first drop in the next one, as in iGibson. Between the two parts it is found which heat source acts on
+what; a caller that knows that nothing else has changed since the last step may run `heat` alone.
 """
 
 from __future__ import annotations

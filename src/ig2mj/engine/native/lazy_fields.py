@@ -155,7 +155,7 @@ class ObjectMotion:
     """Velocities of objects."""
 
     def __init__(self, plan: LazyPlan, qvel: np.ndarray, object_quat: np.ndarray):
-        """`qvel` [W, nv]: nobody changes it any more. `object_quat`: the view's."""
+        """`qvel` [W, nv]: never changed again. `object_quat`: the view's."""
         self._plan, self._qvel, self._quat = plan, qvel, object_quat
         self._made: dict[str, np.ndarray] = {}
 
@@ -185,7 +185,7 @@ class Agents:
         raw: np.ndarray,
         contacts: list[AgentContacts],
     ):
-        """Nobody changes any of the arrays any more.
+        """None of the arrays is changed again.
 
         Args:
           body_pos, body_quat: the view's. raw: [W, n] of `RAW`. contacts: of each world.

@@ -56,7 +56,7 @@ class LiveWorlds:
         arrays = {name: array.copy() for name, array in self.arrays.items()}
         rows = [{name: array[w] for name, array in arrays.items()} for w in range(len(self.worlds))]
         new = LiveWorlds([clone(*pair) for pair in zip(self.worlds, rows, strict=True)], arrays, self.statics)
-        if self.view is not None:  # nobody changes views, nor what makes fields of them later
+        if self.view is not None:  # views, and what computes fields of them, are never changed
             new.view, new.of_objects = self.view, self.of_objects
             new.of_agents, new.of_fingers = self.of_agents, self.of_fingers
         return new

@@ -163,8 +163,8 @@ def _emission(model: StateModel, water: WaterDrops) -> tuple[Bool[Array, "W C N"
 def _fall_in_turns(model: StateModel, water: WaterDrops, poses: Poses) -> tuple[WaterDrops, Int[Array, "W O"]]:
     """`_fall` of those worlds in which a drop is out, `WORLDS_AT_ONCE` at a time.
 
-    In a batch of thousands hardly any tap runs, while the drops of all worlds against all pieces are the dearest rule
-    of a home.
+    In a batch of thousands hardly any tap runs, while the drops of all worlds against all pieces are the most expensive
+    rule of a home.
     """
     num_worlds, objects = water.active.shape[0], model.tables.num_objects
     out = jnp.any(water.active, axis=(1, 2))

@@ -1,7 +1,7 @@
 """Inside: whether two orthogonal axes through an object's centre of mass meet a container on both sides.
 
 Either the vertical and any horizontal axis, or both axes of one of the four planes (table A.1, Inside).
-Nine lines against every piece of the container are dear, and few objects are near any container at all. So only
+Nine lines against every piece of the container are expensive, and few objects are near any container at all. So only
 the pairs that are asked for by a mask are computed: their numbers are listed, container by container, and worked off in
 chunks, as many as there are. Memory is that of one chunk, whatever the number of worlds. Containers of similar size
 share one loop, in which each chunk takes its container's pieces from a table: the compiled program does not grow with

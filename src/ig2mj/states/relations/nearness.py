@@ -4,8 +4,8 @@ The limit is a sixth of the sum of the two boxes' mean edge lengths. In the pape
 closest points of the two collision meshes and must be under the limit; in iGibson's code it is the gap of the world
 boxes and may equal it (docs/design/rules.md#next-to).
 
-Closest points are dear (`ig2mj.geometry.gjk`), and two cluttered objects have thousands of pairs of pieces. So only
-those of object pairs that a mask names are looked at, some at a time, and of their pieces only those whose boxes are
+Closest points are expensive (`ig2mj.geometry.gjk`), and two cluttered objects have thousands of pairs of pieces. They
+are computed only for object pairs that a mask names, some at a time, and of their pieces only for those whose boxes are
 within the limit. Memory is that of one chunk, whatever the number of worlds.
 
 Axes: W worlds, P pairs, C pairs of a chunk, S and T pieces of the two objects, N pairs of pieces of a block.
@@ -121,7 +121,7 @@ class NearPairs:
         of_a = self.first.shape[1]
         pieces = jnp.concatenate([jnp.asarray(self.first), jnp.asarray(self.second)], axis=1)[pair]  # [C, S + T]
         first, second = pieces[:, :of_a], pieces[:, of_a:]
-        # One call for both would be read through slices, and XLA would compute it anew for every pair of pieces.
+        # One call for both would be read through slices, and XLA would compute it again for every pair of pieces.
         low_a, high_a = shapes.boxes(poses, world[:, None], first)
         low_b, high_b = shapes.boxes(poses, world[:, None], second)
         gap = box_gap(low_a[:, :, None], high_a[:, :, None], low_b[:, None], high_b[:, None])

@@ -96,7 +96,7 @@ class RelationPlan:
         return gate(kind, view, self._work[kind].pairs)
 
     def _padded(self, values: Mapping[str, Array], view: PhysicsView) -> dict[str, Array]:
-        """Adds kinds that nobody asked for, so that asking for no pairs gives empty arrays."""
+        """Adds kinds without pairs, so that asking for no pairs gives empty arrays."""
         worlds = view.object_com.shape[0]
         none: dict[str, Array] = {kind: jnp.zeros((worlds, 0, 2), bool) for kind in KINDS if kind not in values}
         return {**none, **values}
