@@ -46,12 +46,10 @@ class Bench:
         return jax.tree.map(lambda a: np.repeat(np.asarray(a)[None], self.num_worlds, axis=0), row)
 
     def run(self, physics: Any, steps: int, ctrl: np.ndarray | None = None) -> tuple[Any, Any]:
-        """Takes control steps, one after the other; gives physics and the last view."""
+        """Takes control steps; gives physics and the last view."""
         view = None
         for _ in range(steps):
             physics, view = self.step(physics, ctrl)
-            if self.engine.pure:  # dozens of steps in flight occupy all of XLA's threads on a machine with few cores
-                jax.block_until_ready(physics)
         return physics, view
 
     @functools.cached_property
