@@ -261,7 +261,7 @@ def test_homes_with_shared_meshes_come_out_of_the_cache_with_them(own, tmp_path,
 
     def convert(out: str, *options: str) -> tuple[dict[str, str], bool]:
         call(["homes", "convert", "--dataset", str(own), "--out", str(tmp_path / out), "--jobs", "1", *options])
-        return contents(tmp_path / out), "1 have not changed: taken from the cache" in capsys.readouterr().out
+        return contents(tmp_path / out), "1 unchanged, taken from the cache" in capsys.readouterr().out
 
     first, cached = convert("a")
     assert not cached and any(f.startswith("meshes/") for f in first) and any(f.startswith("textures/") for f in first)

@@ -95,7 +95,7 @@ def test_warp_is_quiet_inside_the_block_only():
 def test_one_process_draws_with_one_backend(monkeypatch):
     monkeypatch.setattr(settings, "_gl", "egl")
     settings.use_gl("egl")
-    with pytest.raises(EngineError, match="already draws with egl"):
+    with pytest.raises(EngineError, match="already renders with egl"):
         settings.use_gl("osmesa")
     assert ig2mj.process.used_gl() == "egl"
 
