@@ -54,5 +54,5 @@ def test_boxes_meet_seen_from_above():
 
 def test_only_what_lies_on_one_thing_is_mixed():
     for name in ("CookingMeat", "PointNavigation"):
-        with pytest.raises(EngineError, match="augment_starts"):
+        with pytest.raises(EngineError, match="augment"):
             ig2mj.make(name, worlds=1, engine="native", pool_size=1, augment_starts=8)
