@@ -95,24 +95,28 @@ class Environment(StateCopies, StateImages, Configured):
         if core.rules is None:
             raise EngineError("an environment needs a core with rules")
         self.task, self.robot, self.grasping = task, robot, grasping
-        self.scene, self.core, self.num_worlds = scene, core, core.engine.num_worlds
-        self.objective, self._goal, self._map, self._observer = objective, core.rules.goal, action_map, observer
-        self._companions, self.config = companions, config or EnvConfig(period=period)
-        self.action_names, self.observation_spaces = action_map.names, observer.spaces
-        self.sensor_options = observer.sensor_options
+        self.scene, self.core = scene, core
+        self.num_worlds = core.engine.num_worlds
+        self.objective = objective
+        self._goal = core.rules.goal
+        self._map = action_map
+        self._observer = observer
+        self._companions = companions
+        self.config = config or EnvConfig(period=period)
+        self.action_names = action_map.names
+        self.observation_spaces, self.sensor_options = observer.spaces, observer.sensor_options
         self.privileged_names = objective.vectors["privileged_state"]
         self.proprioception_names = core.controllers[0].proprioception_names
         step = core.engine.substeps * core.engine.timestep
-        self.period, self._substeps = period, round(period / step)
+        self.period = period
+        self._substeps = round(period / step)
         if self._substeps < 1 or abs(self._substeps * step - period) > 1e-6:
             raise EngineError(f"an agent step of {period:g} s is not a whole number of control steps of {step:g} s")
         engine = core.engine
         self._clean = engine.compile(self._clean_fn)
         self._rows = engine.compile(self._rows_fn)
-        self._evaluate, self._evaluate_first = (
-            engine.compile(self._evaluate_fn),
-            engine.compile(self._evaluate_first_fn),
-        )
+        self._evaluate = engine.compile(self._evaluate_fn)
+        self._evaluate_first = engine.compile(self._evaluate_first_fn)
         self._step = engine.program(self.step_fn, self.check, donate_argnums=0)
         self._reset = engine.program(self.reset_fn, self.check, donate_argnums=0)
         self._autoreset = engine.program(self.step_autoreset_fn, self.check, donate_argnums=0)

@@ -21,7 +21,7 @@ import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import Grasping
-from ig2mj.engine.base import Engine, Write
+from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.registry import check_options, make_engine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
@@ -37,7 +37,6 @@ from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.simulation import images
-from ig2mj.simulation.own_world import OwnWorld
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
 from ig2mj.simulation.recording import Recorded
 from ig2mj.simulation.robots import RobotsOfWorld, after_write, put_row, remembered
@@ -52,7 +51,7 @@ from ig2mj.worlds.worlds import controllers_of, grasping_of
 
 
 @entry_point
-class Simulation(OwnWorld, Recorded):
+class Simulation(Recorded):
     """One world of a scene on any engine.
 
     Attributes:
@@ -85,7 +84,8 @@ class Simulation(OwnWorld, Recorded):
         self.engine: Engine = make_engine(engine, self.scene, 1, **options) if isinstance(engine, str) else engine
         if self.engine.num_worlds != 1:
             raise EngineError(f"a Simulation is one world, and the engine has {self.engine.num_worlds}")
-        self.state_options, self._seed = states, seed
+        self.state_options = states
+        self._seed = seed
         self.physics = self.engine.reset()
         self._initial = self.engine.export(self.physics, 0)
         self.last_sampling: dict[str, int] = {}
@@ -95,7 +95,8 @@ class Simulation(OwnWorld, Recorded):
     def _begin(self) -> None:
         """States, clock and random key at their start; states are made at the first question about them."""
         self._states: ExtendedStates | None = None
-        self._key, self._steps = jax.random.key(self._seed), 0
+        self._key = jax.random.key(self._seed)
+        self._steps = 0
         self._robots: RobotsOfWorld | None = None
 
     @classmethod
@@ -120,6 +121,18 @@ class Simulation(OwnWorld, Recorded):
         simulation._initial = simulation.engine.export(simulation.physics, 0)
         simulation._states = states
         return simulation
+
+    @property
+    def physics(self) -> Physics:
+        """The engine's state of this world as it is now, also after a step that Ctrl-C or an error ended.
+
+        A handle taken from here is stale after the next step.
+        """
+        return self.engine.current(self._physics)
+
+    @physics.setter
+    def physics(self, physics: Physics) -> None:
+        self._physics = physics
 
     @property
     def time(self) -> float:

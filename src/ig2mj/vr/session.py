@@ -33,7 +33,6 @@ from ig2mj.vr.mapping import Memory, action_of, robot_of
 from ig2mj.vr.sources import PoseSource
 from ig2mj.vr.timing import Timing
 from ig2mj.vr.track import PoseTrack
-from ig2mj.worlds.watching import watch_physics
 
 PERIOD = 1 / 30
 """s of a frame: one control step (iGibson's demonstrations were made at 30 Hz)."""
@@ -110,7 +109,7 @@ class Session:
             rows = {name: array[None] for name, array in to_arrays(None).items()}
             self.env = record(env, record_to, devices=rows, past_success=True)
         self.source, self.timing, self.track = source, Timing(), PoseTrack()
-        watch_physics(env.core, lambda: self.timing.part("physics"))
+        env.core.watch_physics(lambda: self.timing.part("physics"))
         self._scale = env.core.controls.high
         self._touch, self._tell = Touch(env.scene), person or (lambda text: None)
         self.memory, self.frame, self.succeeded = Memory(), None, False

@@ -40,8 +40,16 @@ class TracedExecution:
     def repeat(self, body: Callable[[Any], tuple[Any, Any]], carry: Any, length: int) -> tuple[Any, Any]:
         """See `Engine.repeat`: a loop of the program. Written out, a program would call a physics step `length` times
         as often, and MJX keeps a CUDA graph of each call."""
-        carry, each = jax.lax.scan(lambda carry, _: body(carry), carry, None, length)
-        return carry, jax.tree.map(lambda values: values[-1], each)
+        structures = []
+
+        def turn(carry: Any, _: None) -> tuple[Any, list[Array]]:
+            carry, result = body(carry)
+            leaves, structure = jax.tree.flatten(result)  # a result has a world axis first, what is stacked has not
+            structures.append(structure)
+            return carry, leaves
+
+        carry, each = jax.lax.scan(turn, carry, None, length)
+        return carry, jax.tree.unflatten(structures[0], [values[-1] for values in each])
 
     def constants(self, tree: Any) -> Any:
         """See `Engine.constants`: on the device, in single precision."""
