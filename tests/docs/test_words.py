@@ -11,9 +11,17 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOLDERS = (".", "guide", "design")  # notes and generated pages apart
 PAGES = [ROOT / "README.md", *(page for name in FOLDERS for page in sorted((ROOT / "docs" / name).glob("*.md")))]
 REPLACED = {
-    "anew": "again", "beside": "next to", "natively": "on the native engine", "reckoned": "computed", "dear": "expensive",
-    "picture": "image", "pictures": "images", "film": "video", "films": "videos", "likeliest": "most likely",
-}  # fmt: skip
+    "anew": "again",
+    "beside": "next to",
+    "natively": "on the native engine",
+    "reckoned": "computed",
+    "dear": "expensive",
+    "picture": "image",
+    "pictures": "images",
+    "film": "video",
+    "films": "videos",
+    "likeliest": "most likely",
+}
 CODE = re.compile(r"^```.*?^```|`[^`]*`|\]\([^)]*\)", re.MULTILINE | re.DOTALL)
 
 
