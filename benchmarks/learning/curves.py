@@ -44,6 +44,7 @@ LONG = 20
 """Minutes beyond which the axis is a logarithm's: most runs end within ten."""
 
 REMARK = """
+Settings below have the names of version 0.1; `ig2mj.learn.settings.RENAMED` says what each is called now.
 PointNavigation and Reaching were trained on processors, the others on one H200, from rgbd with another run beside them
 on the card ("sac+expert" alone). "Held out": of the mean actions of the last policy, or of drawn ones, on 1,000
 start states that training never saw. With DAgger and with "sac+expert" (`--expert`) the scripted expert helps; the

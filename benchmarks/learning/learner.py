@@ -1,9 +1,9 @@
 """Updates a second of the learners alone: no environment, a rollout of made-up numbers.
 
-    python -m benchmarks.learning.learner --algo sac --batch 1024 [--obs rgbd] [--set updates=64]
+    python -m benchmarks.learning.learner --algo sac --batch 1024 [--obs rgbd] [--set utd_ratio=64]
     python -m benchmarks.learning.learner --algo dagger --obs rgbd --pixels 128 --rows 80:128 --batch 512 \
         --capacity 200000 \
-        --starts 16384 --set net=glimpses shift=0 actor=160,160 recall=1 --kernels 40
+        --starts 16384 --set encoder=glimpses image_shift=0 actor_layers=160,160 object_memory=poses --kernels 40
 
 An iteration is what `ig2mj train` does after the worlds have stepped: the rollout goes into the replay buffer and all
 updates of the iteration are made, in one program. The buffer holds `--capacity` steps.
@@ -75,11 +75,11 @@ def encoder_of(perception: Perception, config: SACConfig | DaggerConfig) -> glim
 
 
 def seen_by(perception: Perception, *count: int) -> Seen:
-    """Random numbers and pictures."""
+    """Random numbers and images."""
     rng, shape = np.random.default_rng(0), perception.image_shape
     size = 0 if shape is None else int(np.prod(shape))
-    pictures = rng.integers(0, 256, (*count, size), np.uint8)
-    return Seen(jnp.asarray(rng.standard_normal((*count, perception.vector_size)), jnp.float32), jnp.asarray(pictures))
+    images = rng.integers(0, 256, (*count, size), np.uint8)
+    return Seen(jnp.asarray(rng.standard_normal((*count, perception.vector_size)), jnp.float32), jnp.asarray(images))
 
 
 def made_up(algorithm: SAC | PPO | Dagger, worlds: int) -> Transition:
@@ -108,9 +108,9 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=2048)
     parser.add_argument("--batch", type=int, default=0, help="samples of an update of SAC or DAgger")
     parser.add_argument("--capacity", type=int, default=0, help="steps that are kept, of all worlds together")
-    parser.add_argument("--pixels", type=int, default=32, help="height and width of pictures")
+    parser.add_argument("--pixels", type=int, default=32, help="height and width of images")
     parser.add_argument("--rows", help="of these the first that are seen and the first below those, such as 80:128")
-    parser.add_argument("--starts", type=int, default=0, help="DAgger's pictures of start states")
+    parser.add_argument("--starts", type=int, default=0, help="DAgger's images of start states")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE")
     parser.add_argument("--kernels", type=int, default=0, metavar="N", help="print the N longest kernels")
@@ -156,7 +156,8 @@ def main() -> None:
         learner, memory, _ = jax.block_until_ready(iteration(learner, memory, now, True))
         times.append(time.perf_counter() - start)
     seconds = float(np.median(times))
-    batch = rollout.reward.size // algorithm.config.parts if isinstance(algorithm, PPO) else algorithm.config.batch
+    c: Any = algorithm.config
+    batch = rollout.reward.size // c.minibatches if isinstance(algorithm, PPO) else c.batch_size
     weights = sum(a.size for a in jax.tree.leaves(learner.actor))
     row = {
         "algo": args.algo,

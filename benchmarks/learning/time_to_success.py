@@ -4,7 +4,7 @@
 
 Every GPU has the same share: 1,024 worlds and 1,024 samples of an update. Twice the GPUs see twice as much in a second,
 and every update learns from twice as much; there are not more updates. Each run is one process of `ig2mj train --obs
-rgbd --devices N --until 0.95`; all compile side by side, then each trains alone on its GPUs.
+rgbd --devices N --stop-at-success 0.95`; all compile side by side, then each trains alone on its GPUs.
 
 Success is the share of the last episodes, as `ig2mj train` reports it: over one horizon of all worlds at least, so that
 a run cannot stop before its first horizon is over.
@@ -81,15 +81,16 @@ def start(task: str, gpus: tuple[int, ...], args: Args) -> Planned:
     share, count = (2 if args.cpu else 1024), len(gpus)
     settings: dict[str, Any] = {
         "env": task,
-        "engine": "warp",
         "obs": "state" if args.cpu else "rgbd",
         "worlds": share * count,
         "minutes": args.seconds / 60,
-        "until": args.until,
+        "stop_at_success": args.until,
         "devices": str(count),
         "out": str(args.out / f"{task}-{count}"),
-        "pool_size": args.pool_size,
-        "set": [f"batch={(32 if args.cpu else 1024) * count}", *(["capacity=64", "updates=2"] if args.cpu else [])],
+        "set": [
+            *("engine=warp", f"pool_size={args.pool_size}", f"batch_size={(32 if args.cpu else 1024) * count}"),
+            *(("buffer_size=64", "utd_ratio=2") if args.cpu else ()),
+        ],
     }
     environment = {
         "XLA_PYTHON_CLIENT_PREALLOCATE": "false",

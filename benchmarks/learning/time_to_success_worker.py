@@ -1,6 +1,6 @@
 """One run of `benchmarks/learning/time_to_success.py`: `ig2mj train`, which waits between compiling and training.
 
-    python -m benchmarks.learning.time_to_success_worker '{"env": "CookingMeat", "devices": "2", "until": 0.95, ...}'
+    python -m benchmarks.learning.time_to_success_worker '{"env": "CookingMeat", "devices": "2", ...}'
 
 Says `READY {...}` once everything is compiled, trains after a line on standard input, and answers `DONE {...}`.
 """
