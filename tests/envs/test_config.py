@@ -11,6 +11,7 @@ import pytest
 import ig2mj
 from ig2mj.engine.mjx.engine import MjxEngine
 from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.scene_engine import SceneEngine
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.envs.config import EngineOptions, EnvConfig, Overrides, current_names
 from ig2mj.errors import EngineError, UnknownNameError
@@ -32,7 +33,7 @@ def test_every_field_can_be_overridden_and_every_option_of_an_engine_too():
     fields = {f.name for f in dataclasses.fields(EnvConfig)}
     assert fields | set(EngineOptions.__annotations__) == set(Overrides.__annotations__)
     taken: set[str] = set()
-    for engine in (NativeEngine, MjxEngine, WarpEngine):
+    for engine in (SceneEngine, NativeEngine, MjxEngine, WarpEngine):
         taken |= {p.name for p in inspect.signature(engine).parameters.values() if p.kind is p.KEYWORD_ONLY}
     assert taken == set(EngineOptions.__annotations__)
     documented = EnvConfig.__doc__

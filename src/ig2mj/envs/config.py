@@ -38,8 +38,8 @@ RENAMED = {"paper_rl": "relaxed_thresholds", "mixed": "augment_starts"}
 class EngineOptions(TypedDict, total=False):
     """Options of engines; what is absent has the engine's default. An option of another engine is refused.
 
-    Of every engine: see `ig2mj.engine.native.NativeEngine`. `threads` is the native engine's; `initial` is of the warp
-    and the jax engine; the others are the warp engine's.
+    Of every engine: see `ig2mj.engine.native.NativeEngine`. `threads` and `incremental` are the native engine's;
+    `initial` is of the warp and the jax engine; the others are the warp engine's.
     """
 
     substeps: int
@@ -48,6 +48,7 @@ class EngineOptions(TypedDict, total=False):
     boxes: str
     model_fields: Sequence[str]
     threads: int | None
+    incremental: bool
     initial: Snapshot | None
     profile: EngineProfile | None
     iterations: int | None
