@@ -154,7 +154,7 @@ def test_a_file_of_another_environment_names_the_pair_and_the_fix(env, file, tmp
         ("worlds", 4, r"worlds = '4', here '2' \(make it with worlds="),
         ("layout", "other", "have changed since"),
         ("version", 0, "holds no environment state of format 1"),
-        ("kind", "pool", "is not a state"),
+        ("kind", "pool", "holds no environment state of format 1"),
     ):
         write(tmp_path / "other.npz", {**header, name: value}, arrays)
         with pytest.raises(InputError, match=said):
