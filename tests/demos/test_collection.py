@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import pathlib
 
 import h5py
 import numpy as np
 import pytest
 
 from ig2mj.cli import call
-from ig2mj.demos import Recording, Replayer
+from ig2mj.demos import Recording, Replayer, find_recording
 from ig2mj.demos.collection import FAILED, collect
+from ig2mj.demos.compact import write_compact
 from ig2mj.demos.convert import convert
 from ig2mj.demos.metrics import metrics_of
 from ig2mj.envs.experts import expert_of
@@ -77,6 +79,28 @@ def test_metrics_of_a_compact_recording_are_of_all_frames(cooking_meat, collecte
     for run in metrics_of(collected[0], settle=0, env=cooking_meat):
         assert len(run["goal"]["each_frame"]) == run["frames"] > 10
         assert run["goal"]["each_frame"][-1] == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_all_recordings_of_a_folder_are_measured_and_replayed_on_two_processes(tmp_path, capsys):
+    """One of them is broken: it is named, and the others are done."""
+    for name in ("a", "b"):
+        with Recording(find_recording("GraspingBook")) as recording:
+            write_compact(recording, tmp_path / f"{name}.h5", recording.runs[:2])
+    (tmp_path / "c.h5").write_bytes(b"nothing")
+    assert call(["demos", "metrics", str(tmp_path), "--jobs", "2", "--settle", "0", "--json"]) == 2
+    done = capsys.readouterr()
+    measured = [json.loads(line) for line in done.out.splitlines()]
+    assert [(pathlib.Path(run["file"]).name, run["success"]) for run in measured] == [
+        ("a.h5", True),
+        ("a.h5", True),
+        ("b.h5", True),
+        ("b.h5", True),
+    ]
+    assert "c.h5: is not an HDF5 file" in done.err
+    assert call(["demos", "replay", str(tmp_path), "--jobs", "2", "--by", "state"]) == 2
+    assert capsys.readouterr().out.count("2 runs, ") == 2
 
 
 @pytest.fixture

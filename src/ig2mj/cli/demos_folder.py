@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import tyro
@@ -34,13 +34,13 @@ def metrics(
     import json as form
     import sys
 
-    from ig2mj.demos.metrics import metrics_of
     from ig2mj.errors import Ig2mjError
 
     if jobs < 1 or settle < 0:
         raise Ig2mjError(f"--jobs {jobs}, --settle {settle}: at least one process, and no less than 0 steps")
     failed, chosen = 0, (success_only, include_incomplete)
-    for file, found in of_files(metrics_of, files_of(path), jobs, settle, None, *chosen):
+    options = {"settle": settle, "success_only": success_only, "incomplete": include_incomplete}
+    for file, found in of_files("ig2mj.demos.metrics:metrics_job", files_of(path), jobs, **options):
         if isinstance(found, Ig2mjError):
             print(f"error: {found}", file=sys.stderr)
             failed += 1
@@ -55,7 +55,7 @@ def metrics(
 
 
 def _others(file: pathlib.Path, success_only: bool, incomplete: bool) -> str:
-    """What was not measured, for people."""
+    """The episodes that were not measured, as text."""
     from ig2mj.demos.reader import Recording
     from ig2mj.demos.selection import advice, chosen_runs, left_out
 
@@ -83,8 +83,11 @@ def _line(file: pathlib.Path, run: dict[str, Any]) -> str:
 
 
 def files_of(path: pathlib.Path) -> list[pathlib.Path]:
-    """The recordings of a folder, the file itself, or that of demonstrations that ship. Raises InputError: a folder
-    has none. UnknownNameError."""
+    """The recordings of a folder, the file itself, or that of demonstrations that ship.
+
+    Raises:
+      InputError: a folder has none. UnknownNameError: nothing has this name.
+    """
     from ig2mj.demos.shipped import find_recording
     from ig2mj.errors import InputError
 
@@ -97,30 +100,30 @@ def files_of(path: pathlib.Path) -> list[pathlib.Path]:
 
 
 def of_files(
-    work: Callable[..., Any], files: list[pathlib.Path], jobs: int, *arguments: Any
+    function: str, files: list[pathlib.Path], jobs: int, **arguments: Any
 ) -> Iterator[tuple[pathlib.Path, Any]]:
-    """What `work(file, *arguments)` returns for each file, or its `Ig2mjError`, in their order.
+    """The JSON result of the job `function(file=..., **arguments)` for each file in their order, or its `Ig2mjError`.
 
-    With one job or one file it is done here; else in processes that begin afresh, since JAX must not be forked.
+    With one file, or one process, the jobs run in this process.
     """
-    import concurrent.futures
-    import multiprocessing
+    import json
 
-    if jobs == 1 or len(files) == 1:
-        for file in files:
-            yield file, _tried(work, file, arguments)
-        return
-    context = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(min(jobs, len(files)), context) as pool:
-        waiting = [pool.submit(_tried, work, file, arguments) for file in files]
-        for file, done in zip(files, waiting, strict=True):
-            yield file, done.result()
-
-
-def _tried(work: Callable[..., Any], file: pathlib.Path, arguments: tuple[Any, ...]) -> Any:
+    from ig2mj.cli.common.jobs import follow
+    from ig2mj.cluster.job_runner import Where, map_jobs
+    from ig2mj.cluster.jobs import Job, JobSet, import_function
     from ig2mj.errors import Ig2mjError
 
-    try:
-        return work(file, *arguments)
-    except Ig2mjError as e:
-        return Ig2mjError(str(e))
+    if jobs == 1 or len(files) == 1:
+        run = import_function(function)
+        for file in files:
+            try:
+                found = json.loads(run(file=str(file), **arguments))
+            except Ig2mjError as e:
+                found = e
+            yield file, found
+        return
+    all_jobs = [Job(f"file_{n:06d}", {"file": str(file), **arguments}) for n, file in enumerate(files)]
+    with follow("reading recordings") as report:
+        store, failed = map_jobs(JobSet(function, "", all_jobs, gpu=True), Where(jobs), progress=report)
+    for file, job in zip(files, all_jobs, strict=True):
+        yield file, Ig2mjError(failed[job.name]) if job.name in failed else json.loads(store.get(job.name))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import pathlib
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from ig2mj.cli.common.jobs import Cluster, Resume, where_of
+from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
 
 if TYPE_CHECKING:
+    from ig2mj.cluster.job_runner import Where
     from ig2mj.demos.reader import Run
-    from ig2mj.demos.replay import Replayed
     from ig2mj.envs.environment import EnvState
 
 
@@ -46,7 +47,6 @@ def replay(
 
     from ig2mj.cli.common.files import check_output, check_video
     from ig2mj.cli.demos_folder import files_of, of_files
-    from ig2mj.cli.demos_jobs import replay_by_jobs
     from ig2mj.demos.replay import MODES
     from ig2mj.errors import Ig2mjError, UnknownNameError
 
@@ -66,34 +66,27 @@ def replay(
         if video is not None:
             raise Ig2mjError("--video is made on this machine: leave --cluster and --resume out")
         where = where_of(jobs, cluster, resume)
-        return max(replay_by_jobs(one, by, check, names, out, threads, where) for one in files)
+        return max(_replay_by_jobs(one, by, check, names, out, threads, where) for one in files)
     status = 0
-    for one, done in of_files(_replayed, files, jobs, by, check, video, names, out, threads):
+    options: dict[str, Any] = {"by": by, "check": check, "names": names, "threads": threads}
+    options |= {name: None if path is None else str(path) for name, path in (("video", video), ("out", out))}
+    for one, done in of_files("ig2mj.cli.demos_replay:replay_file_job", files, jobs, **options):
         if isinstance(done, Ig2mjError):
             if len(files) == 1:
                 raise done
             print(f"error: {done}", file=sys.stderr)
             status = 2
             continue
-        for warning in done.warnings:
-            print(f"warning: {warning}", file=sys.stderr)
-        for difference in done.differences:
-            print(f"{one}: {difference}")
-        same = "" if not check or by == "state" or done.differences else ", all the same"
-        print(f"{one}: {done.runs} runs, {done.frames} frames by {by}{same}")
-        status = max(status, 1 if done.differences else 0)
+        status = max(status, print_replay(one, done, by, check))
     return status
 
 
-def _replayed(
-    file: pathlib.Path,
-    by: str,
-    check: bool,
-    video: pathlib.Path | None,
-    names: tuple[str, ...],
-    out: pathlib.Path | None,
-    threads: int,
-) -> Replayed:
+def replay_file_job(
+    file: str, by: str, check: bool, names: Sequence[str], threads: int, video: str | None, out: str | None
+) -> bytes:
+    """Replays one recording, for a job; the result as JSON. Arguments: of `replay`."""
+    import json
+
     from ig2mj.demos.reader import Recording
     from ig2mj.demos.replay import Replayer
     from ig2mj.demos.replay_jobs import Observing
@@ -101,21 +94,23 @@ def _replayed(
 
     options: dict[str, Any] = {"threads": threads} if threads else {}
     with Recording(file) as recording:
-        replayer = Replayer(recording, by, observations=names or VECTORS, **options)
+        replayer = Replayer(recording, by, observations=tuple(names) or VECTORS, **options)
         watchers: list[Any] = []
         observing = None
         try:
             if video is not None:
-                watchers.append(_Filming(video, replayer.env))
+                watchers.append(_Filming(pathlib.Path(video), replayer.env))
             if names:
-                observing = Observing.into(out or file.with_suffix(".sensors.h5"), names, recording)
+                observing = Observing.into(pathlib.Path(out or sensors_file(file)), names, recording)
                 watchers.append(observing)
 
             def watch(state: EnvState, runs: dict[int, Run], frame: int) -> None:
                 for watcher in watchers:
                     watcher.see(state, runs, frame)
 
-            return replayer(check, watch if watchers else None)
+            done = replayer(check, watch if watchers else None)
+            found = {"runs": done.runs, "frames": done.frames, "warnings": done.warnings}
+            return json.dumps({**found, "differences": [str(d) for d in done.differences]}).encode()
         except BaseException:
             if observing is not None:
                 observing.discard()
@@ -123,6 +118,66 @@ def _replayed(
         finally:
             for watcher in watchers:
                 watcher.close()
+
+
+def _replay_by_jobs(
+    file: pathlib.Path,
+    by: str,
+    check: bool,
+    sensors: Sequence[str],
+    out: pathlib.Path | None,
+    threads: int,
+    where: Where,
+) -> int:
+    """Replays one recording; the exit status. Arguments: of `ig2mj demos replay`."""
+    import contextlib
+    import hashlib
+
+    from ig2mj.cluster.job_runner import map_jobs
+    from ig2mj.cluster.jobs import JobSet
+    from ig2mj.demos.reader import Recording
+    from ig2mj.demos.replay_jobs import RECORDING, join_replays, replay_jobs
+    from ig2mj.envs.shared_starts import shared_pool
+
+    settings = {"file": str(file.resolve()), "by": by, "check": check, "sensors": list(sensors), "threads": threads}
+    observed = (out or sensors_file(file)) if sensors else None
+    with Recording(file) as recording:
+        made = recording.value("made_with", dict)
+        starts = {"task": recording.value("task", str), "split": made.get("split"), "count": made.get("pool_size")}
+        jobs = replay_jobs(recording, {**settings, "starts": starts})
+    title = f"replaying {file.name}"
+    shared = {} if where.cluster is None else {RECORDING: file.read_bytes(), **shared_pool(**starts)}
+    work = JobSet(
+        "ig2mj.demos.replay_jobs:replay_job", title, jobs, shared, ("ig2mj.envs.shared_starts:start_states", starts)
+    )
+    request = {"command": "demos replay", "digest": hashlib.sha256(file.read_bytes()).hexdigest(), **settings}
+    with contextlib.ExitStack() as stack:
+        journal = stack.enter_context(opened(observed or file.with_suffix(".replay"), request, where))
+        store, failed = map_jobs(work, where, journal, stack.enter_context(follow(title)))
+        parts = (store.get(job.name) for job in jobs if job.name not in failed)
+        done = join_replays(parts, observed)
+        if not failed:
+            journal.finish()
+    tell_failures(failed, len(jobs))
+    return max(print_replay(file, done, by, check and not failed), 1 if failed else 0)
+
+
+def print_replay(file: pathlib.Path, done: Mapping[str, Any], by: str, check: bool) -> int:
+    """Prints the result of a replay; the exit status."""
+    import sys
+
+    for warning in done["warnings"]:
+        print(f"warning: {warning}", file=sys.stderr)
+    for difference in done["differences"]:
+        print(f"{file}: {difference}")
+    same = "" if not check or by == "state" or done["differences"] else ", all the same"
+    print(f"{file}: {done['runs']} runs, {done['frames']} frames by {by}{same}")
+    return 1 if done["differences"] else 0
+
+
+def sensors_file(file: str | pathlib.Path) -> pathlib.Path:
+    """The default file for the observations of a replay."""
+    return pathlib.Path(file).with_suffix(".sensors.h5")
 
 
 def export(

@@ -19,6 +19,7 @@ Axes: T steps of a run, H hands.
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 from typing import Any
 
@@ -54,7 +55,7 @@ def metrics_of(
     success_only: bool = False,
     incomplete: bool = False,
 ) -> list[dict[str, Any]]:
-    """Of the complete runs of a recording, in their order; numbers and text only.
+    """Metrics of the complete runs of a recording, in their order; numbers and text only.
 
     Args:
       settle: control steps before start and end are compared; 0: as they are.
@@ -87,6 +88,11 @@ def metrics_of(
                 own = watched[run.name].result(measured)
                 found[run.name] = about | own | _disarrangement(measured, start, end, world)
         return [found[run.name] for run in runs]
+
+
+def metrics_job(file: str, settle: int, success_only: bool, incomplete: bool) -> bytes:
+    """The result of `metrics_of` as JSON, for a job."""
+    return json.dumps(metrics_of(file, settle, None, success_only, incomplete)).encode()
 
 
 @dataclasses.dataclass
@@ -142,7 +148,7 @@ class _Watched:
 
 
 class _Measuring:
-    """What is needed of an environment: settled worlds, facts, what an axis meets."""
+    """Measurements in an environment: settled worlds, predicates, objects on a ray."""
 
     def __init__(self, env: Environment, settle: int):
         rules = env.core.rules
@@ -156,7 +162,7 @@ class _Measuring:
         self._groups = np.array([1, 0, 0, 0, 0, 0], np.uint8)  # what is seen
 
     def settled(self, state: EnvState) -> EnvState:
-        """The worlds after nobody has moved for a while."""
+        """The worlds after `settle` control steps without action."""
         zero = np.zeros((self.env.num_worlds, *self.env.action_space.shape), np.float32)
         for _ in range(self._settle):
             state = self.env.step(state, zero)
