@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import html
 import importlib
 import inspect
 import io
@@ -59,6 +60,8 @@ def struct(name: str) -> str:
         default = f"`{ast.unparse(node.value)}`" if node.value is not None else "required"
         default = re.sub(r"`msgspec\.field\(.*\)`", "empty", default)
         rows.append(f"| `{ast.unparse(node.target)}` | {_code(ast.unparse(node.annotation))} | {default} | {remark} |")
+    if all(row.endswith("|  |") for row in rows[2:]):  # no field has a remark
+        rows = [row.rsplit("|", 2)[0] + "|" for row in rows]
     return "\n".join(rows)
 
 
@@ -108,8 +111,8 @@ def _help(arguments: list[str]) -> str:
 
 
 def _code(text: str) -> str:
-    """As code; a bar in it would end the cell of a table."""
-    return f"`{text}`".replace("|", "\\|")
+    """As code in a cell of a table, which a bar would end."""
+    return f"<code>{html.escape(text).replace('|', '&#124;')}</code>" if "|" in text else f"`{text}`"
 
 
 def _sentence(text: str) -> str:
