@@ -42,7 +42,7 @@ class SmallEnv:
     def action_space(self) -> Space:
         return Space((self.size,), np.float32, -1.0, 1.0)
 
-    def serve(self, devices):
+    def prepare_devices(self, devices):
         """Nothing to make ready."""
 
     def reset(self, seed: int) -> State:

@@ -54,7 +54,7 @@ class Space:
 
 class Env:
     pure, num_worlds = True, 32
-    def serve(self, devices): pass
+    def prepare_devices(self, devices): pass
 
 vectors = {"proprioception": Space((8,)), "privileged_state": Space((5,))}
 pictures = {"rgb": Space((64, 64, 3), np.uint8), "depth": Space((64, 64, 1))} if MODE == "rgbd" else {}
