@@ -1,6 +1,6 @@
 """A plain PyTorch loop (advantage actor-critic) in many worlds at once: `pip install torch`, then
 
-python examples/torch_loop.py --worlds 16           # natively on a processor
+python examples/torch_loop.py --worlds 16           # on the native engine, on a CPU
 python examples/torch_loop.py --worlds 2048         # on a GPU; tensors never leave it
 """
 

@@ -18,7 +18,7 @@ from ig2mj.states.options import CONTROL_TIMESTEP
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text("utf-8")
 GENERATED = re.compile(r"<!-- begin: .*?<!-- end of [\w ]+ -->", re.DOTALL)
-NAMES = ("ig2mj", "iGibson 2.0", "BEHAVIOR-100", "H200", "H100", "A100")
+NAMES = ("ig2mj", "iGibson 2.0", "BEHAVIOR-100", "BEHAVIOR-1K", "H200", "H100", "A100")
 WORDS = (
     "two",
     "three",
