@@ -60,11 +60,12 @@ class UnknownNameError(Ig2mjError):
     FEW = 20
     """So many names are listed where none is near."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]):
+    def __init__(self, kind: str, name: str, known: Iterable[str], *, meant: str | None = None):
+        """`meant`: the one of `known` that is named instead of near matches."""
         name = str(name)  # whatever else was given in a name's place
         self.kind, self.name = kind, name
-        names = [k for k in known if k]
-        near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+        names = list(dict.fromkeys(k for k in known if k))
+        near = [meant] if meant else difflib.get_close_matches(name, names, n=3, cutoff=0.5)
         if near:
             hint = f"; near matches: {', '.join(near)}"
         elif names and len(names) <= self.FEW:

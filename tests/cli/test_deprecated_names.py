@@ -34,9 +34,7 @@ def test_an_old_option_is_the_new_one(probe, capsys, words):
     assert out.out == "0.5\n"
     assert out.err.count("\n") == ("until" in words[0])
     if "until" in words[0]:
-        assert out.err == (
-            "ig2mj probe: '--until' is now '--stop-at-success'; the old name will be removed in the next release\n"
-        )
+        assert out.err == ("ig2mj probe: '--until' is now '--stop-at-success'; the old name will be removed in 0.3\n")
 
 
 def test_an_old_option_with_an_underscore_is_found_too(probe, capsys):
@@ -76,7 +74,7 @@ def test_an_old_subcommand_is_the_new_one(probe, capsys):
     assert cli.call(["probe", "pictures"]) == 0
     out = capsys.readouterr()
     assert out.out == "images\n"
-    assert out.err == "ig2mj probe: 'pictures' is now 'images'; the old name will be removed in the next release\n"
+    assert out.err == "ig2mj probe: 'pictures' is now 'images'; the old name will be removed in 0.3\n"
 
 
 def functions() -> dict[str, object]:

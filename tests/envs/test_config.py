@@ -6,6 +6,7 @@ import dataclasses
 import inspect
 import typing
 
+import gymnasium
 import pytest
 
 import ig2mj
@@ -79,15 +80,34 @@ def test_what_is_no_mapping_is_refused():
 
 
 def test_an_old_name_works_and_names_the_new_one():
-    with pytest.warns(DeprecationWarning, match="'mixed' is now 'augment_starts'"):
+    with pytest.warns(FutureWarning, match="'mixed' is now 'augment_starts'"):
         assert EnvConfig().override(mixed=5).augment_starts == 5
     with (
-        pytest.warns(DeprecationWarning, match="'paper_rl' is now 'relaxed_thresholds'") as warned,
+        pytest.warns(FutureWarning, match="'paper_rl' is now 'relaxed_thresholds'") as warned,
         pytest.raises(EngineError, match="relaxed_thresholds for PointNavigation"),
     ):
         ig2mj.make("PointNavigation", engine="native", paper_rl=True)
     assert warned[0].filename == __file__, "where Python shows it"
     assert current_names({"paper_rl": False, "split": "train"}) == {"relaxed_thresholds": False, "split": "train"}
+
+
+def test_a_config_is_made_with_the_same_names_as_make_takes():
+    with pytest.warns(FutureWarning, match="'paper_rl' is now 'relaxed_thresholds'.*removed in 0.3") as warned:
+        assert EnvConfig(paper_rl=True).relaxed_thresholds  # pyright: ignore[reportCallIssue]
+    assert warned[0].filename == __file__
+    with pytest.raises(UnknownNameError, match="near matches: pool_size"):
+        EnvConfig(pol_size=4)  # pyright: ignore[reportCallIssue]
+    with pytest.raises(EngineError, match="threads is an option of the engine"):
+        EnvConfig(threads=4)  # pyright: ignore[reportCallIssue]
+
+
+def test_names_of_other_libraries_for_the_number_of_worlds_are_understood():
+    with pytest.raises(UnknownNameError, match=r"near matches: worlds$"):
+        ig2mj.make("PointNavigation", num_envs=4)  # pyright: ignore[reportCallIssue]
+    with pytest.raises(EngineError, match=r"gymnasium.make_vec\(..., num_envs=4\)"):
+        gymnasium.make("ig2mj/PointNavigation-v0", worlds=4)
+    with pytest.raises(EngineError, match="takes num_envs"):
+        gymnasium.make_vec("ig2mj/PointNavigation-v0", num_envs=2, worlds=4)
 
 
 def test_all_forms_make_the_same_environment_and_it_can_be_made_again():

@@ -24,7 +24,7 @@ from ig2mj.learn.occlusion.projection import CameraProjection
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, flat
 from ig2mj.learn.ppo import PPOConfig
-from ig2mj.learn.run_config import RunSettings, read_run_file, settings_of
+from ig2mj.learn.run_config import RunSettings, initial_policy, read_run_file, settings_of
 from ig2mj.learn.sac import SACConfig
 from ig2mj.learn.shipped import CHECKOUT
 from ig2mj.tasks.activity_objective import privileged_names
@@ -128,6 +128,46 @@ def test_a_file_that_is_none_is_refused_with_what_is_wrong(text, said, tmp_path)
 def test_settings_that_cannot_be_are_refused(change, said):
     with pytest.raises(Ig2mjError, match=said):
         settings_of("sac", (change,))
+
+
+@pytest.mark.parametrize(
+    ("algo", "change", "said"),
+    [
+        ("sac", "beta_decay=1", "^--set beta_decay: beta_decay is a setting of dagger, not of sac$"),
+        ("sac", "alone=1", "'alone' is now 'beta_decay'; beta_decay is a setting of dagger, not of sac"),
+        ("dagger", "n_step=3", "n_step is a setting of sac, not of dagger"),
+        ("sac", "worlds=8", "worlds is an option, --worlds"),
+    ],
+)
+def test_a_setting_of_another_algorithm_is_named_as_such(algo, change, said):
+    with pytest.raises(Ig2mjError, match=said):
+        settings_of(algo, (change,))
+
+
+def test_an_old_name_is_reported_by_the_first_call_only(capsys):
+    changes = ("copy=1", "paper_rl=true")
+    first, again = settings_of("sac", changes), settings_of("sac", changes, quiet=True)
+    assert first == again and first[1].bc_coef == 1 and first[0].relaxed_thresholds
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 2 and "'copy' is now 'bc_coef'; the old name will be removed in 0.3" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [((80, 128), r"32 rows \(set image_size=128\)"), ((8,), "two numbers"), ((9, 8), "such as image_rows=16,32")],
+)
+def test_rows_that_an_image_does_not_have_are_refused_with_what_to_set(rows, said):
+    with pytest.raises(Ig2mjError, match=said):
+        assert RunSettings(image_rows=rows).rows
+    assert RunSettings(image_rows=(80, 128), image_size=128).rows == (80, 128)
+
+
+def test_a_misspelt_file_and_a_missing_first_stage_are_named():
+    with pytest.raises(UnknownNameError, match="near matches: CookingMeat"):
+        read_run_file("CookinMeat")
+    name = "GraspingBook-fetch-physical-sac"
+    with pytest.raises(InputError, match=f"`ig2mj train --config {name} --out elsewhere/{name}`"):
+        initial_policy(f"elsewhere/{name}")
 
 
 def test_algorithms_know_nothing_of_learning_under_occlusion_nor_of_experts():

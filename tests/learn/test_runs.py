@@ -272,7 +272,7 @@ def test_names_of_version_0_1_work_and_say_what_they_are_called_now(capsys):
     assert occlusion == OcclusionConfig(object_memory="full", belief_labels=True)
     told = capsys.readouterr().err.splitlines()
     assert len(told) == 5 and "'updates' is now 'utd_ratio'" in told[0]
-    with pytest.warns(DeprecationWarning, match="SACConfig: 'every' is now 'policy_delay'"):
+    with pytest.warns(FutureWarning, match="SACConfig: 'every' is now 'policy_delay'"):
         assert SACConfig(every=2) == SACConfig(policy_delay=2)
 
 

@@ -101,5 +101,5 @@ def test_a_fork_of_a_simulation_goes_on_alone(scene):
 def test_the_old_name_of_load_still_works(scene, tmp_path):
     one = ig2mj.Simulation(scene)
     one.save(tmp_path / "world.npz")
-    with pytest.warns(DeprecationWarning, match="'Simulation.restore' is now 'Simulation.load'"):
+    with pytest.warns(FutureWarning, match="'Simulation.restore' is now 'Simulation.load'"):
         one.restore(tmp_path / "world.npz")

@@ -25,7 +25,7 @@ Rules for such a file:
     missing packages (ModuleNotFoundError) and OSErrors.
   - Results go to stdout, progress and remarks to stderr, so that `--json` can be piped.
   - The name of a parameter that is a Python keyword: `Annotated[Vec3, tyro.conf.arg(name="from")]`.
-  - Old names of options and sub-commands keep working for one release: see `ig2mj.cli.common.deprecated`.
+  - Old names of options and sub-commands keep working until version 0.3: see `ig2mj.cli.common.deprecated`.
   - What several commands share is in `ig2mj.cli.common`.
 
 Exit statuses: 0 done, 1 something failed (a check, or an error of ig2mj itself), 2 bad input or bad usage, 3 converted

@@ -125,22 +125,21 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
     from ig2mj.learn.occlusion.encoder_pretraining import pretrain
     from ig2mj.learn.perception import Perception, depth_range_of
     from ig2mj.learn.policies import Policy, depends_on, world_of
-    from ig2mj.learn.run_config import settings_of
-    from ig2mj.learn.shipped import find_policy
+    from ig2mj.learn.run_config import initial_policy, settings_of
     from ig2mj.learn.train import Run, train
     from ig2mj.learn.warm_start import init_from_policy
     from ig2mj.process import keep_scratch_in_place
     from ig2mj.sensors.base import SensorOptions
 
     algo, obs, seed, devices = chosen.algo, chosen.obs, chosen.seed, chosen.devices
-    former = None if chosen.init_from is None else find_policy(chosen.init_from)
+    former = None if chosen.init_from is None else initial_policy(chosen.init_from)
     topology = find_topology(os.environ)
     if devices != "1" or (topology and topology.count > 1):
         keep_scratch_in_place()
     team = Team.join(topology)
     with team.together():
         # JAX's backend must not be asked for before the processes have joined
-        settings, config, occlusion = settings_of(algo, changes, on_gpu=jax.default_backend() == "gpu")
+        settings, config, occlusion = settings_of(algo, changes, jax.default_backend() == "gpu", quiet=True)
         engine = settings.engine
         count = chosen.worlds or WORLDS.get(engine, PURE_WORLDS)
         shared = _devices(devices, team.count)

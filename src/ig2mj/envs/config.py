@@ -12,9 +12,10 @@ may stand next to the others. A name that does not exist is refused with near ma
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.task_robot import TaskRobot
@@ -32,7 +33,13 @@ VECTORS = ("proprioception", "privileged_state")
 """Observations that every engine and every task can make."""
 
 RENAMED = {"paper_rl": "relaxed_thresholds", "mixed": "augment_starts"}
-"""Old names of settings, which work for one release, and their new ones."""
+"""Old names of settings, which work until version 0.3, and their new ones."""
+
+
+_MEANT = {"num_envs": "worlds", "n_envs": "worlds", "num_worlds": "worlds"}
+"""Names that other libraries have for a setting."""
+
+Config = TypeVar("Config")
 
 
 class EngineOptions(TypedDict, total=False):
@@ -81,6 +88,26 @@ class Overrides(EngineOptions, total=False):
     engine_options: EngineOptions
 
 
+def _checks_names(config: type[Config]) -> type[Config]:
+    """Lets a class of settings be made with old names, with a FutureWarning; its errors name near matches."""
+    make = config.__init__
+
+    @functools.wraps(make)
+    def init(self: Any, *values: Any, **named: Any) -> None:
+        named = current_names(named, warn=True)
+        for name in named:
+            if name in ENGINE_OPTIONS:
+                fix = f"engine_options={{'{name}': ...}}"
+                raise EngineError(f"{name} is an option of the engine: EnvConfig({fix}), or make(..., {name}=...)")
+            if name not in FIELDS:
+                raise UnknownNameError("setting of EnvConfig", name, FIELDS, meant=_MEANT.get(name))
+        make(self, *values, **named)
+
+    config.__init__ = init  # pyright: ignore[reportAttributeAccessIssue]
+    return config
+
+
+@_checks_names
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class EnvConfig:
     """Settings of an environment; `ig2mj.make` checks them.
@@ -151,7 +178,7 @@ class EnvConfig:
         options = {**options, **{name: values.pop(name) for name in list(values) if name in ENGINE_OPTIONS}}
         for name in values:
             if name not in FIELDS:
-                raise UnknownNameError("option of make", name, (*FIELDS, *ENGINE_OPTIONS))
+                raise UnknownNameError("option of make", name, (*FIELDS, *ENGINE_OPTIONS), meant=_MEANT.get(name))
         if options:
             values["engine_options"] = {**self.engine_options, **options}
         return dataclasses.replace(self, **values)

@@ -94,6 +94,8 @@ class GymEnv(gymnasium.Env):
         self.state: EnvState | None = None
         self.render_mode = _checked(render_mode)
         self.env: Environment
+        if "worlds" in options or "num_envs" in options:
+            raise EngineError("gymnasium.make makes one world; many are gymnasium.make_vec(..., num_envs=4)")
         try:
             refuse_fork()
         except EngineError:
@@ -159,6 +161,8 @@ class GymVectorEnv(gymnasium.vector.VectorEnv):
     ):
         """Arguments as `ig2mj.make`; autoreset_mode: see the module's text. render_mode: "rgb_array", or None."""
         self.render_mode = _checked(render_mode)
+        if "worlds" in options:
+            raise EngineError(f"worlds={options['worlds']}: gymnasium.make_vec takes num_envs")
         self.env = make(task, worlds=num_envs, **options)
         self.state: EnvState | None = None
         self.num_envs = num_envs

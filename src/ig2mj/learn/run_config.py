@@ -29,7 +29,7 @@ from ig2mj.learn.algorithms import config_of
 from ig2mj.learn.bc import BCConfig
 from ig2mj.learn.occlusion import OcclusionConfig
 from ig2mj.learn.settings import configure_all, written
-from ig2mj.learn.shipped import CHECKOUT, INSTALLED
+from ig2mj.learn.shipped import CHECKOUT, INSTALLED, find_policy
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,9 +91,16 @@ class RunSettings:
         if not self.image_rows:
             return None
         if len(self.image_rows) != 2 or not self.image_rows[0] < self.image_rows[1] <= self.image_size:
-            words = f"two numbers such as 80,128, of at most {self.image_size} rows (image_size)"
-            raise Ig2mjError(f"image_rows={written(self.image_rows)}: {words}")
+            raise Ig2mjError(f"image_rows={written(self.image_rows)}: {self._why_no_rows()}")
         return self.image_rows[0], self.image_rows[1]
+
+    def _why_no_rows(self) -> str:
+        if len(self.image_rows) == 2 and self.image_rows[0] < self.image_rows[1]:
+            least = next((size for size in (32, 64, 128) if size >= self.image_rows[1]), None)
+            fix = f" (set image_size={least})" if least else ""
+            return f"images of image_size={self.image_size} have {self.image_size} rows{fix}"
+        example = f"{self.image_size // 2},{self.image_size}"
+        return f"two numbers, the first row and the first below the last, such as image_rows={example}"
 
 
 def read_run_file(file: str | os.PathLike) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -107,7 +114,10 @@ def read_run_file(file: str | os.PathLike) -> tuple[dict[str, Any], tuple[str, .
     """
     path = pathlib.Path(file)
     if not path.exists() and len(path.parts) == 1:
-        path = next((f for folder in (CHECKOUT, INSTALLED) if (f := folder / f"{path.stem}.toml").is_file()), path)
+        known = shipped_runs()
+        path = known.get(path.stem, path)
+        if not path.suffix:
+            raise UnknownNameError("training file", path.name, known)
     try:
         found = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as e:
@@ -131,29 +141,66 @@ def read_run_file(file: str | os.PathLike) -> tuple[dict[str, Any], tuple[str, .
     return {name: getattr(options, name) for name in found}, tuple(f"{n}={written(v)}" for n, v in settings.items())
 
 
+def shipped_runs() -> dict[str, pathlib.Path]:
+    """Files of the runs that the policies that ship come from, by name."""
+    folders = [folder for folder in (INSTALLED, CHECKOUT) if folder.is_dir()]
+    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.toml"))}
+
+
+def initial_policy(name: str) -> pathlib.Path:
+    """The file of the policy that a run begins with; as `find_policy`, whose errors name the run that makes it."""
+    try:
+        return find_policy(name)
+    except InputError as e:
+        stage = pathlib.PurePath(name).name
+        if pathlib.Path(name).exists() or stage not in shipped_runs():
+            raise
+        fix = f"the first stage makes it: `ig2mj train --config {stage} --out {name}`"
+        raise InputError(name, e.problem, fix=fix) from e
+
+
 def _items(value: Any) -> list[Any]:
     return value if isinstance(value, list) else []
 
 
-def settings_of(algo: str, changes: tuple[str, ...], on_gpu: bool = False) -> tuple[RunSettings, Any, OcclusionConfig]:
+def settings_of(
+    algo: str, changes: tuple[str, ...], on_gpu: bool = False, quiet: bool = False
+) -> tuple[RunSettings, Any, OcclusionConfig]:
     """The settings of a run.
 
     Args:
       algo: name of the algorithm. changes: "name=value", the last of a name counts. on_gpu: the default engine is warp.
+      quiet: old names are not reported, since an earlier call with the same changes has.
 
     Returns:
       Those of the run, of the algorithm (defaults for its engine), and of learning under occlusion.
 
     Raises:
-      UnknownNameError: no such algorithm or setting, with near matches. Ig2mjError: a value that cannot be.
+      UnknownNameError: no such algorithm or setting, with near matches. Ig2mjError: a value that cannot be, or the
+        setting of another algorithm.
     """
     if algo not in ALGORITHMS:
         raise UnknownNameError("algorithm", algo, ALGORITHMS)
     run = RunSettings(engine="warp" if on_gpu else "native")
     own = [c for c in changes if c.partition("=")[0] == "engine"]
     small = configure_all([run], own)[0].engine == "native"
-    algorithm = BCConfig() if algo == "bc" else config_of(algo, small=small)
-    run, algorithm, occlusion = configure_all([run, algorithm, OcclusionConfig()], changes)
+    configs = [run, _algorithm(algo, small), OcclusionConfig()]
+    run, algorithm, occlusion = configure_all(configs, changes, _elsewhere(algo), quiet)
     if run.programs not in (1, 2):
         raise Ig2mjError(f"programs={run.programs}: 1 or 2 are possible")
     return run, algorithm, occlusion
+
+
+def _algorithm(algo: str, small: bool = False) -> Any:
+    return BCConfig() if algo == "bc" else config_of(algo, small=small)
+
+
+def _elsewhere(algo: str) -> dict[str, str]:
+    """Names that are no settings of an algorithm, and what they are: of other algorithms, or options of the command."""
+    owners: dict[str, list[str]] = {}
+    for other in ALGORITHMS:
+        for field in dataclasses.fields(_algorithm(other)):
+            owners.setdefault(field.name, []).append(other)
+    found = {name: f"{name} is a setting of {', '.join(of)}, not of {algo}" for name, of in owners.items()}
+    options = [field.name for field in dataclasses.fields(RunOptions)]
+    return found | {name: f"{name} is an option, --{name.replace('_', '-')}" for name in options if name != "env"}

@@ -1,6 +1,6 @@
 """Settings by name, as `--set name=value` and a file of settings give them.
 
-Names of version 0.1 keep working for one release: `RENAMED` says what each is called now.
+Names of version 0.1 keep working until version 0.3: `RENAMED` says what each is called now.
 """
 
 from __future__ import annotations
@@ -9,11 +9,12 @@ import dataclasses
 import functools
 import math
 import sys
-import warnings
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from ig2mj.errors import Ig2mjError, UnknownNameError
+from ig2mj.process.deprecation import rename_text, warn_renamed
 
 Config = TypeVar("Config")
 
@@ -71,6 +72,10 @@ RENAMED: dict[str, tuple[str, ...]] = {
     "recall": ("object_memory",),
     "believed": ("belief_labels",),
     "until": ("stop_at_success",),
+    "paper_rl": ("relaxed_thresholds",),
+    "mixed": ("augment_starts",),
+    "pixels": ("image_size",),
+    "rows": ("image_rows",),
 }
 """Name of version 0.1 -> what it is called now; the first that the settings at hand have."""
 
@@ -79,7 +84,7 @@ _VALUES = {"object_memory": {"0": "none", "1": "poses", "2": "full"}}
 
 
 def old_names_work(config: type[Config]) -> type[Config]:
-    """Lets a class of settings be made with the names of version 0.1, with a DeprecationWarning."""
+    """Lets a class of settings be made with the names of version 0.1, with a FutureWarning."""
     make = config.__init__
     known = {f.name for f in dataclasses.fields(config)}  # pyright: ignore[reportArgumentType]
 
@@ -89,7 +94,7 @@ def old_names_work(config: type[Config]) -> type[Config]:
         for name, value in named.items():
             now = name if name in known else _new_name(name, known)
             if now != name:
-                warnings.warn(f"{config.__name__}: '{name}' is now '{now}'", DeprecationWarning, stacklevel=2)
+                warn_renamed(name, now, config.__name__)
             new[now] = value
         make(self, *values, **new)
 
@@ -106,11 +111,18 @@ def configured(config: Config, changes: Sequence[str]) -> Config:
     return configure_all((config,), changes)[0]
 
 
-def configure_all(configs: Sequence[Any], changes: Sequence[str]) -> list[Any]:
+def configure_all(
+    configs: Sequence[Any],
+    changes: Sequence[str],
+    elsewhere: Mapping[str, str] = MappingProxyType({}),
+    quiet: bool = False,
+) -> list[Any]:
     """Dataclasses with some of their fields changed.
 
     Args:
       changes: "name=value"; the layers of a network as "256,256". A name of version 0.1 prints one line on stderr.
+      elsewhere: names of other settings, and what to say of each where it is given.
+      quiet: nothing is printed, since an earlier call with the same changes has.
 
     Raises:
       UnknownNameError: no such setting, with near matches. Ig2mjError: no value of its type, or one that cannot be:
@@ -123,9 +135,13 @@ def configure_all(configs: Sequence[Any], changes: Sequence[str]) -> list[Any]:
         if not sign:
             raise Ig2mjError(f"--set {change}: a setting is name=value")
         if name not in fields and (now := _new_name(name, fields)) != name:
-            print(f"setting '{name}' is now '{now}'; the old name will be removed in the next release", file=sys.stderr)
+            if not quiet:
+                print(f"setting {rename_text(name, now)}", file=sys.stderr)
             name, text = now, _VALUES.get(now, {}).get(text, text)
         if name not in fields:
+            if (now := _new_name(name, elsewhere)) in elsewhere:
+                was = "" if now == name else f"'{name}' is now '{now}'; "
+                raise Ig2mjError(f"--set {name}: {was}{elsewhere[now]}")
             raise UnknownNameError("setting", name, fields)
         new[name] = _value(name, text, fields[name])
         _check(name, new[name])

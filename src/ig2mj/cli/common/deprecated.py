@@ -1,4 +1,4 @@
-"""Old names of options and of sub-commands, which keep working for one release.
+"""Old names of options and of sub-commands, which keep working until version 0.3.
 
 A function of the command line names the options that were renamed:
 
@@ -16,6 +16,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
+
+from ig2mj.process.deprecation import rename_text
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -74,4 +76,4 @@ def new_subcommand(command: str, name: str, renamed: Mapping[str, str]) -> str:
 
 def _warn(prog: str, old: str, new: str) -> None:
     new += "VALUE" * new.endswith("=")
-    print(f"{prog}: '{old}' is now '{new}'; the old name will be removed in the next release", file=sys.stderr)
+    print(f"{prog}: {rename_text(old, new)}", file=sys.stderr)
