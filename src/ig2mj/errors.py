@@ -60,8 +60,8 @@ class UnknownNameError(Ig2mjError):
     FEW = 20
     """So many names are listed where none is near."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str], *, meant: str | None = None):
-        """`meant`: the one of `known` that is named instead of near matches."""
+    def __init__(self, kind: str, name: str, known: Iterable[str], *, meant: str | None = None, also: str = ""):
+        """`meant`: the one of `known` that is named instead of near matches. `also`: what ends the message."""
         name = str(name)  # whatever else was given in a name's place
         self.kind, self.name = kind, name
         names = list(dict.fromkeys(k for k in known if k))
@@ -72,7 +72,7 @@ class UnknownNameError(Ig2mjError):
             hint = f" (there is {', '.join(names)})"
         else:
             hint = "" if names else " (there is none)"
-        super().__init__(f"no {kind} is named '{name}'{hint}")
+        super().__init__(f"no {kind} is named '{name}'{hint}{also and '; '}{also}")
 
 
 class AbilityError(Ig2mjError):

@@ -77,6 +77,21 @@ def test_an_error_of_ig2mj_itself_is_status_1_and_no_traceback(command, capsys):
     assert "--debug" in line
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("train --num-envs 8", "there is no option --num-envs; the option is --worlds"),
+        ("rollout --env CookingMeat", "ENV is positional, as in `ig2mj rollout ENV`"),
+        ("convert --urdf x.urdf", "(a URDF: `ig2mj convert object FILE`,"),
+        ("inspect x.urdf", "is a URDF, not a converted scene"),
+        ("states small_home --set toggeld_on=stove_0", "near matches: toggled_on\n"),
+    ],
+)
+def test_what_a_new_user_types_is_answered_with_what_to_type(capsys, words, said):
+    assert cli.call(words.split()) == 2
+    assert said in capsys.readouterr().err
+
+
 def test_a_missing_package_names_the_command_that_installs_it(command, capsys):
     def run() -> None:
         raise ModuleNotFoundError("No module named 'coacd'", name="coacd")

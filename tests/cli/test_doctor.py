@@ -184,5 +184,5 @@ def test_progress_names_what_is_still_being_tried(monkeypatch):
             release.set()
 
     diagnosis.diagnose(note)
-    assert said[0] == "trying MuJoCo, JAX, Warp, to draw with egl, to draw with osmesa, to draw with warp"
-    assert "trying to draw with egl, to draw with osmesa, to draw with warp" in said
+    assert said[0] == "trying MuJoCo, JAX, Warp, rendering with egl, rendering with osmesa, rendering with warp"
+    assert "trying rendering with egl, rendering with osmesa, rendering with warp" in said

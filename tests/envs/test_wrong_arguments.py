@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.errors import ActionError, EngineError, Ig2mjError, UnknownNameError
+from ig2mj.errors import ActionError, EngineError, Ig2mjError, InputError, UnknownNameError
 
 TASK = "PointNavigation"
 
@@ -52,6 +52,37 @@ def test_a_mask_needs_a_state(env):
 def test_a_seed_is_a_whole_number(env, seed):
     with pytest.raises(EngineError, match="a seed is a whole number"):
         env.reset(seed)
+
+
+@pytest.mark.parametrize(
+    "keys", [jax.random.split(jax.random.key(0), 2), jax.random.split(jax.random.PRNGKey(0), 2), jax.numpy.arange(2)]
+)
+def test_an_environment_takes_one_key_of_jax(env, keys):
+    with pytest.raises(EngineError, match="takes one key or seed for all worlds"):
+        env.reset(keys)
+
+
+def test_a_number_of_steps_is_given_by_name(tiny_home):
+    with pytest.raises(EngineError, match=r"step\(count=30\)"):
+        ig2mj.Simulation(tiny_home, states=None).step(30)
+
+
+def test_a_urdf_in_the_place_of_a_robot_or_a_scene_is_named_as_such():
+    with pytest.raises(EngineError, match=r"UrdfRobot.load\('x.urdf'\), on the command line --robot-urdf x.urdf"):
+        ig2mj.make(TASK, robot="x.urdf")
+    with pytest.raises(InputError, match="`ig2mj convert object FILE`"):
+        ig2mj.load_scene("x.urdf")
+
+
+def test_environments_and_simulations_print_what_they_are(env, tiny_home):
+    robot = env.robot
+    assert repr(env) == f"Environment('{TASK}', robot '{robot}', 2 worlds, engine 'native')"
+    assert repr(ig2mj.Simulation(tiny_home, states=None)) == f"Simulation('{tiny_home.name}', engine 'native')"
+
+
+def test_an_unknown_environment_names_activities_too():
+    with pytest.raises(UnknownNameError, match=r"near matches: PointNavigation.*activity/NAME"):
+        ig2mj.make("PointNavigatoin")
 
 
 @pytest.mark.parametrize("count", [2, 3])

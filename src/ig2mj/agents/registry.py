@@ -48,6 +48,9 @@ def make_robot(name: str) -> TaskRobot:
     """
     from ig2mj.agents.task_robot import TaskRobot
 
+    if name not in ROBOTS and name.lower().endswith(".urdf"):
+        fix = f"in Python UrdfRobot.load('{name}'), on the command line --robot-urdf {name}"
+        raise EngineError(f"robot '{name}' is a file, not a name: {fix}")
     if name not in ROBOTS:
         raise UnknownNameError("robot", name, ROBOTS)
     registered = ROBOTS[name]

@@ -176,6 +176,11 @@ def _dispatch(args: list[str]) -> int:
         print(_nested_help(name, module.__doc__, subcommands))
         return 0 if rest else 2
     sub = new_subcommand(name, rest[0], getattr(module, "RENAMED", {}))
+    if sub not in subcommands and any(arg.lower().endswith(".urdf") for arg in rest):
+        words = [f"`ig2mj {name} {known} FILE`" for known in ("object", "robot", "scene") if known in subcommands]
+        if words:
+            print(f"error: '{sub}' is not a command of 'ig2mj {name}' (a URDF: {', '.join(words)})", file=sys.stderr)
+            return 2
     if sub not in subcommands:
         return _unknown(f"command of 'ig2mj {name}'", sub, subcommands, f"ig2mj {name} --help")
     return _run(subcommands[sub], f"ig2mj {name} {sub}", rest[1:])

@@ -1,4 +1,4 @@
-"""`ig2mj demos replay FILE` and `export FILE`: replays recordings, checks, films, observes and exports them."""
+"""`ig2mj demos replay FILE` and `export FILE`: replays recordings, checks, renders, observes and exports them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def replay(
       by: action: take every action again (on the native engine the result is byte-identical); state: load every frame
         as recorded, exact on any machine.
       check: compare every byte of every frame; print the first difference of each run, exit status 1 if there is one.
-      video: film of the first run (.mp4, .gif); needs OpenGL and the native engine.
+      video: video of the first run (.mp4, .gif); needs OpenGL and the native engine.
       sensors: compute observations that were not recorded, e.g. rgb,depth; written to --out.
       out: HDF5 file of the observations; default: FILE with the ending .sensors.h5.
       threads: threads on which the native engine steps worlds; 0: one per processor.
@@ -196,7 +196,7 @@ def export(
     Args:
       file: the recording (`ig2mj rollout --record FILE`).
       out: output file; for lerobot and igibson a folder.
-      to: robomimic (HDF5), lerobot (datasets v3.0: parquet and films) or igibson (HDF5).
+      to: robomimic (HDF5), lerobot (datasets v3.0: parquet and videos) or igibson (HDF5).
       by: replay by action (compares every byte) or by state.
       obs: observations, e.g. proprioception,rgb; default: those of the recorded environment. igibson has none.
       success_only: export successful episodes only.
@@ -230,7 +230,7 @@ def export(
 
 
 class _Filming:
-    """A film of the first run of the first world that is replayed."""
+    """A video of the first run of the first world that is replayed."""
 
     def __init__(self, file: pathlib.Path, env: Any):
         from ig2mj.showcase.episode_video import EpisodeVideo

@@ -10,6 +10,8 @@ import tyro
 def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
     """List the environments with their tasks, homes and robots.
 
+    Activities of BEHAVIOR-100 are environments, too: activity/NAME (`ig2mj activity list`).
+
     Args:
       json: print JSON instead of a table.
     """
@@ -36,4 +38,5 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
         return 0
     rows = [(t.name, t.home, ", ".join(able_robots(t)), t.summary) for t in TASKS.values()]
     stdout_console().print(make_table("environments", ("name", "home", "robots", "task"), rows))
+    print("\nactivity/NAME is each of BEHAVIOR-100's activities; `ig2mj activity list` names them.")
     return 0

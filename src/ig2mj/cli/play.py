@@ -26,8 +26,8 @@ def run(
 ) -> int:
     """Drive a robot in an environment by keyboard and mouse, in MuJoCo's viewer.
 
-    In the window: Enter lists the keys. Without the robot, objects are picked with a double-click, dragged with Ctrl
-    and the right button by a spring of at most 100 N, and pushed with P, as in iGibson's viewer.
+    In the window: Enter lists the keys. Independently of the robot, select an object by double-click, drag it with
+    Ctrl and the right button by a spring of at most 100 N, and push it with P, as in iGibson's viewer.
 
     Args:
       env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).

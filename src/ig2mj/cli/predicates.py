@@ -24,13 +24,13 @@ def run(
     """Show which predicates are true in a scene, or whether an expression holds and why not.
 
     Without EXPRESSION: every unary predicate, and on_top, inside and on_floor of objects that touch or contain each
-    other. With one, the exit status is 0 if it holds and 1 if it does not. Example: '(and (cooked fish_0) (forall (?p
-    - plate) (on_top ?p table_0)))'.
+    other. With one, the exit status is 0 if it holds and 1 if it does not. Example: '(and (cooked fish_0)
+    (on_top plate_0 breakfast_table_0))'.
 
     Args:
       scene: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj.
       expression: predicates joined by and, or, not, imply, forall, exists, forn, forpairs, fornpairs.
-      set: set states first, e.g. toggled_on=stove or temperature=fish=80.
+      set: set states first, e.g. toggled_on=stove_0 or temperature=fish_0=80.
       seconds: simulate this many seconds first.
       compat: follow the paper, or iGibson's code where the two differ.
       strict: report an error, instead of false, for an object that lacks the predicate's ability.

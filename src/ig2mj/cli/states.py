@@ -29,7 +29,7 @@ def run(
       scene: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj.
       object: only these objects, with all their states.
       state: only these states, e.g. temperature in_contact_objs.
-      set: set states first, e.g. toggled_on=stove or temperature=fish=80.
+      set: set states first, e.g. toggled_on=stove_0 or temperature=fish_0=80.
       seconds: simulate this many seconds first.
       compat: follow the paper, or iGibson's code where the two differ.
       json: print JSON instead of a table.

@@ -45,7 +45,7 @@ def run(
       certificate: PEM file with your certificate, to serve the page by HTTPS.
       key: PEM file with the certificate's private key, if it is a separate file.
       goal: for a scene: expression to evaluate and explain, e.g. '(cooked fish_0)'.
-      set: for a scene: set states first, e.g. toggled_on=stove or temperature=fish=80.
+      set: for a scene: set states first, e.g. toggled_on=stove_0 or temperature=fish_0=80.
       pool: for a scene: pool of start states (`ig2mj sample`).
       worlds: number of worlds; the page shows one of them.
       engine: native, warp or jax. Only on native can objects be dragged.

@@ -57,7 +57,7 @@ def diagnose(progress: Callable[[str], None] = lambda text: None) -> list[Check]
         "MuJoCo": lambda: run_probe("mujoco"),
         "JAX": lambda: run_probe("jax"),
         "Warp": lambda: run_probe("warp"),
-        **{f"to draw with {name}": functools.partial(probe, name) for name in BACKENDS},
+        **{f"rendering with {name}": functools.partial(probe, name) for name in BACKENDS},
     }
     with concurrent.futures.ThreadPoolExecutor(max_workers=len(tasks)) as pool:
         waiting = {pool.submit(task): name for name, task in tasks.items()}

@@ -124,6 +124,10 @@ class Environment(StateCopies, StateImages, Configured):
         self._load = engine.program(self._load_fn, donate_argnums=0)
         self._resume = engine.program(self._begun, core.check)
 
+    def __repr__(self) -> str:
+        count = f"{self.num_worlds} world{'s' * (self.num_worlds != 1)}"
+        return f"Environment('{self.task.name}', robot '{self.robot}', {count}, engine '{self.core.engine.name}')"
+
     @property
     def pure(self) -> bool:
         """`step_fn`, `step_autoreset_fn` and `reset_fn` may be part of a compiled program of the caller's."""

@@ -58,7 +58,8 @@ def find_task(name: str) -> AnyTask:
         return bddl_task(activity)
     short = short_name(name)
     if short is None:
-        raise UnknownNameError("environment", name.removeprefix(f"{NAMESPACE}/"), NAMES)
+        also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`)"
+        raise UnknownNameError("environment", name.removeprefix(f"{NAMESPACE}/"), NAMES, also=also)
     return TASKS[short]
 
 

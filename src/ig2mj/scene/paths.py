@@ -19,6 +19,11 @@ SHIPPED_HOMES = next(
 """Homes that come with the project: the folder of a checkout, or the one next to an installed package. `load_scene`
 finds them by their bare names."""
 
+_URDF = (
+    "`ig2mj convert object FILE` converts an object, `ig2mj convert scene` a scene; "
+    "`ig2mj view SCENE --robot-urdf FILE` shows a robot"
+)
+
 _FIX = "give the folder that `ig2mj convert` wrote"
 
 
@@ -39,6 +44,8 @@ def scene_folder(path: str | os.PathLike) -> pathlib.Path:
     path = pathlib.Path(path)
     if path.is_dir():
         return path
+    if path.suffix.lower() == ".urdf":
+        raise InputError(path, "is a URDF, not a converted scene", fix=_URDF)
     if path.is_file():
         if path.name not in (*MODEL_FILES, MANIFEST_FILE):
             raise InputError(path, "is not a file of a converted scene", fix=f"{_FIX}, or its {MODEL_FILES[0]}")

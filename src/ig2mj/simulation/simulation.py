@@ -99,6 +99,9 @@ class Simulation(Recorded):
         self._steps = 0
         self._robots: RobotsOfWorld | None = None
 
+    def __repr__(self) -> str:
+        return f"Simulation('{self.scene.name}', engine '{self.engine.name}')"
+
     @classmethod
     def from_snapshot(
         cls, scene: Scene, snapshot: Snapshot, states: ExtendedStates | None = None, **options: Any
@@ -239,6 +242,8 @@ class Simulation(Recorded):
           LostWorldError: the world is not finite any more; nothing changes it but `reset` and what loads another.
         """
         row = None if ctrl is None else np.asarray(ctrl, np.float64)
+        if row is not None and not row.ndim:
+            raise EngineError(f"step({ctrl}): the first argument is ctrl; a number of steps is step(count={ctrl})")
         if row is not None and row.shape != (self.scene.model.nu,):
             raise EngineError(
                 f"ctrl has shape {row.shape}; scene '{self.scene.name}' has {self.scene.model.nu} actuators"
@@ -373,7 +378,7 @@ class Simulation(Recorded):
         return WorldSampler(self.scene, self.state_model)
 
     def predicate(self, name: str, *arguments: str, strict: bool = False) -> bool:
-        """Whether a predicate holds now, e.g. `predicate("on_top", "book", "table")`.
+        """Whether a predicate holds now, e.g. `predicate("on_top", "plate_0", "coffee_table_0")`.
 
         Raises:
           UnknownNameError: no such predicate, object or room. ArityError: too many or too few arguments.

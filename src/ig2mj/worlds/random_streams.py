@@ -33,7 +33,8 @@ def as_seed(seed: Seed, num_worlds: int | None = None) -> int | Int[Array, ""] |
     Raises:
       EngineError: not a whole number for each world.
     """
-    if isinstance(seed, jax.Array) and (jnp.issubdtype(seed.dtype, jax.dtypes.prng_key) or seed.ndim == 1):
+    if isinstance(seed, jax.Array) and (jnp.issubdtype(seed.dtype, jax.dtypes.prng_key) or seed.ndim):
+        _check_one_key(seed)
         return (jax.random.bits(seed, (), jnp.uint32) >> 1).astype(jnp.int32)
     if isinstance(seed, int | np.integer):
         return int(seed) % LARGEST
@@ -46,6 +47,14 @@ def as_seed(seed: Seed, num_worlds: int | None = None) -> int | Int[Array, ""] |
     if not isinstance(seed, jax.Array | np.ndarray) or not jnp.issubdtype(seed.dtype, jnp.integer):
         raise EngineError(f"a seed is a whole number or a key of JAX, not {seed!r}")
     return jnp.asarray(seed, jnp.int32)
+
+
+def _check_one_key(key: jax.Array) -> None:
+    """Raises EngineError: not a single key."""
+    typed = jnp.issubdtype(key.dtype, jax.dtypes.prng_key)
+    if key.ndim if typed else (key.ndim != 1 or key.dtype != jnp.uint32):
+        words = "an environment takes one key or seed for all worlds, or a list of whole numbers, one for each"
+        raise EngineError(f"an array of JAX as seed has shape {key.shape} and is of {key.dtype}: {words}")
 
 
 def episode_keys(seed: Seeds, world: Int[Array, "W"], episode: Int[Array, "W"]) -> UInt[Array, "W 2"]:

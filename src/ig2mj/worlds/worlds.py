@@ -77,6 +77,11 @@ class Worlds(Face):
         controllers = controllers_of(self.scene, engine.substeps * engine.timestep)
         self.core = Core(engine, rules, pool, controllers, grasping_of(engine, grasping), True)
 
+    def __repr__(self) -> str:
+        engine = self.core.engine
+        count = f"{engine.num_worlds} world{'s' * (engine.num_worlds != 1)}"
+        return f"Worlds('{self.scene.name}', {count}, engine '{engine.name}')"
+
 
 def controllers_of(scene: Scene, period: float) -> list[Controller]:
     """The controllers of the scene's robots, in the order of its agents; `period`: seconds between two actions."""

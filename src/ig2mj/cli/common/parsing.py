@@ -17,7 +17,26 @@ from ig2mj.errors import Ig2mjError
 def parse_and_call(function: Callable[..., Any], prog: str, args: Sequence[str]) -> Any:
     """The function's result for the arguments of the command line. Raises SystemExit, as tyro does."""
     args = with_new_names(function, prog, args)
+    _check_options(function, prog, args)
     return tyro.cli(_with_quiet_defaults(function), prog=prog, args=args, config=(tyro.conf.DisallowNone,))
+
+
+_MEANT = {"num_envs": "worlds", "n_envs": "worlds", "num_worlds": "worlds"}
+"""Names that other libraries have for an option."""
+
+
+def _check_options(function: Callable[..., Any], prog: str, args: Sequence[str]) -> None:
+    """Raises Ig2mjError: an option of another name, or one for an argument that is given by its position."""
+    hints = typing.get_type_hints(function, include_extras=True)
+    for arg in args:
+        option = arg.partition("=")[0]
+        name = option.removeprefix("--").replace("-", "_")
+        if not option.startswith("--"):
+            continue
+        if name not in hints and _MEANT.get(name) in hints:
+            raise Ig2mjError(f"there is no option {option}; the option is --{_MEANT[name]}")
+        if name in hints and tyro.conf.Positional in getattr(hints[name], "__metadata__", ()):
+            raise Ig2mjError(f"{option} is no option: {name.upper()} is positional, as in `{prog} {name.upper()}`")
 
 
 def _with_quiet_defaults(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -42,7 +42,7 @@ def started(
 def _parsed(setting: str) -> tuple[str, str, bool | float]:
     parts = setting.split("=")
     if len(parts) not in (2, 3) or not all(parts):
-        raise Ig2mjError(f"--set {setting}: write STATE=OBJECT or STATE=OBJECT=VALUE, e.g. temperature=fish=80")
+        raise Ig2mjError(f"--set {setting}: write STATE=OBJECT or STATE=OBJECT=VALUE, e.g. temperature=fish_0=80")
     if len(parts) == 2:
         return parts[0], parts[1], True
     word = parts[2].lower()

@@ -19,7 +19,7 @@ class NavigationTask:
       goal: "point" (the base at a point of the floor), "reach" (the first hand at a point in the air) or "close"
         (furniture closed).
       objects: of the object library, put on free floor at random in every episode.
-      others: how many TurtleBots drive about at random.
+      others: number of TurtleBots that move at random.
       opened: categories of furniture whose joints are opened at random.
       target_dist: m along the floor from the start to the target, least and most.
       target_height: m above the floor, least and most, of a target to reach.
@@ -68,14 +68,14 @@ POINT_NAVIGATION = NavigationTask("PointNavigation", "Drive to a point of the fl
 
 INTERACTIVE_NAVIGATION = NavigationTask(
     "InteractiveNavigation",
-    "Drive to a point of the floor on which five things lie about.",
+    "Drive to a point of the floor with five objects on it.",
     ("turtlebot", "fetch"),
     objects=_LOOSE,
 )
 
 DYNAMIC_NAVIGATION = NavigationTask(
     "DynamicNavigation",
-    "Drive to a point of the floor on which another robot drives about.",
+    "Drive to a point of the floor with another moving robot.",
     ("turtlebot", "fetch"),
     others=1,
 )
@@ -95,7 +95,7 @@ walls."""
 
 ROOM_REARRANGEMENT = NavigationTask(
     "RoomRearrangement",
-    "Close the doors and drawers that stand open.",
+    "Close the doors and drawers that are open.",
     ("fetch",),
     goal="close",
     opened=_FURNITURE,
