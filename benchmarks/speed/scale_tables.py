@@ -175,7 +175,7 @@ def tables(args: argparse.Namespace) -> str:
         ]
         for gpus in GPUS
     ]
-    head = ["H200s", "60 objects, control steps/s", "birch with pictures, control steps/s"]
+    head = ["H200s", "60 objects, control steps/s", "birch with images, control steps/s"]
     parts += ["### What so many GPUs give", table([*head, "SAC from pixels, agent steps/s", "of ideal"], rows)]
     if seen:
         every = sorted({n for case in seen.values() for n in case if n > 1})
@@ -215,11 +215,11 @@ def tables(args: argparse.Namespace) -> str:
     rows = [
         [f"start state of {pool['home']}, in a file", f"{amount(pool['file_bytes_per_row'])}B", ""],
         ["the same, on the device", f"{amount(pool['memory_bytes_per_row'])}B", ""],
-        ["picture, 128x128 RGB-D", f"{amount(picture['rgb_and_depth_128_bytes'])}B", f"{amount(made)}B, never stored"],
+        ["image, 128x128 RGB-D", f"{amount(picture['rgb_and_depth_128_bytes'])}B", f"{amount(made)}B, never stored"],
         ["the same as it is kept, 32x32", f"{amount(picture['kept_32_bytes'])}B",
          f"{amount(one['learner'] * picture['kept_32_bytes'])}B, into the replay buffer"],
     ]  # fmt: skip
-    parts += ["### Start states and pictures", table(["what", "each", "a second on one H200"], rows)]
+    parts += ["### Start states and images", table(["what", "each", "a second on one H200"], rows)]
     rows = [
         [title, f"{worlds:,}", f"{each:.2f} MB", f"{round(0.9 * 141e3 / each):,}"] for title, worlds, each in memory()
     ]
@@ -236,9 +236,9 @@ def tables(args: argparse.Namespace) -> str:
     head = ["CookingMeat on one H200", "agent steps/s", "GPU hours", f"at {args.price:g} an hour"]
     parts += ["### A billion agent steps", table(head, rows)]
     assumed = (
-        f"Forecasts (~) take {args.inside:g} GB/s between a host's {HOST} GPUs, {args.between:g} GB/s between hosts "
-        f"and {1e6 * LATENCY:g} us for each doubling of the number of GPUs; nothing of them is measured. "
-        f"What sharing costs an update is that of the newest two cards above, whichever they were."
+        f"Forecasts (~) assume {args.inside:g} GB/s between a host's {HOST} GPUs, {args.between:g} GB/s between hosts "
+        f"and {1e6 * LATENCY:g} us for each doubling of the number of GPUs; none of them is measured. "
+        f"The cost of sharing per update is that of the newest measurement on two cards."
     )
     return "\n\n".join([*parts, assumed])
 
