@@ -16,6 +16,10 @@ from __future__ import annotations
 
 import dataclasses
 
+from ig2mj.process.public_names import offer_modules
+
+offer_modules(__name__)
+
 MEMORIES = ("none", "poses", "full")
 
 
