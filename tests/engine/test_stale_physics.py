@@ -207,11 +207,11 @@ def test_an_interrupted_simulation_goes_on(tiny_home, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    react = simulation.core._react
-    monkeypatch.setattr(simulation.core, "_react", interrupted)  # after physics was stepped
+    react = simulation.core._apply_rules
+    monkeypatch.setattr(simulation.core, "_apply_rules", interrupted)  # after physics was stepped
     with pytest.raises(KeyboardInterrupt):
         simulation.step()
-    monkeypatch.setattr(simulation.core, "_react", react)
+    monkeypatch.setattr(simulation.core, "_apply_rules", react)
     simulation.step()
     assert simulation.time == pytest.approx(3 / 30)
     with pytest.raises(StaleStateError):

@@ -67,7 +67,7 @@ def test_batches_that_were_used_up_are_refused(worlds, scene):
         "rollout": lambda: core.rollout(used, None, lambda batch, carry: (None, carry), 1),
     }
     for call in calls.values():
-        with pytest.raises(StaleStateError, match="go on with the state that the last call returned"):
+        with pytest.raises(StaleStateError, match="continue with the state that the last call returned"):
             call()
     nothing = np.zeros(2, bool)
     for change in (lambda b: core.write(b, Write()), lambda b: core.load(b, row), lambda b: worlds.reset(b, nothing)):

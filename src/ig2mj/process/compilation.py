@@ -66,7 +66,7 @@ PROGRAMS = {
     "run": "a predicate's question",
     "evaluate_fn": "rewards and observations",
     "evaluate_first_fn": "observations after a reset",
-    "chosen": "the choice of worlds to reset",
+    "select_worlds": "the choice of worlds to reset",
     "draw_fn": "the draw of start states",
     "rows_fn": "the reset of worlds",
     "acted": "the robots' controllers",

@@ -249,14 +249,16 @@ class Simulation(Recorded):
                 f"ctrl has shape {row.shape}; scene '{self.scene.name}' has {self.scene.model.nu} actuators"
             )
         row, view = None if row is None else row[None], self.view
-        advance, physics, states, done = self.core.advance, self.physics, self._states_or_none, 0
+        step, rest = self.core.physics_step, self.core.after_physics  # an interrupted step keeps its physics
+        physics, states, done = self.physics, self._states_or_none, 0
         robots = self.robots if self._grasping is not None else None
         controllers, grasps = (remembered(self), None) if robots is None else (robots.controllers, robots.held)
         if (recorder := self._recorder) is not None:
             recorder.begin()
         try:
             for done in range(1, count + 1):
-                physics, view, states, _, grasps = advance(physics, states, row, controllers, grasps)
+                physics, view = step(physics, row)
+                physics, view, states, _, grasps = rest(physics, view, states, controllers, grasps)
                 if robots is not None:
                     robots.held = grasps
                 row = None

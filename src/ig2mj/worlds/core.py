@@ -103,7 +103,7 @@ class Core:
         self.hand_resets = HandResets(engine, self.controllers, hand_resets)
         self.controls = Controls(engine, self.controllers)
         self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
-        self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
+        self.physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
         self._count = guards.counter(engine, lambda: self.starts.floor, engine.substeps * engine.timestep)
         self._select = engine.compile(select_worlds)
         self.advance = engine.program(self.advance_fn)
@@ -155,10 +155,10 @@ class Core:
         """One control step of MuJoCo's controls: `advance_fn`, guards and clocks."""
         world, controllers = batch.world, batch.controllers
         try:
-            physics, view = self._physics_step(world.physics, ctrl)
+            physics, view = self.physics_step(world.physics, ctrl)
         except LostWorldError:  # the other worlds were stepped; guards flag this one
             physics, view = world.physics, self.engine.view(world.physics)
-        after = self._after_physics(physics, view, world.states, controllers, batch.grasps)
+        after = self.after_physics(physics, view, world.states, controllers, batch.grasps)
         clocks = (world.step, world.time, batch.flags, batch.troubles)
         step, time, flags, troubles = self._count(*clocks, self.engine.health(after.physics), after.view.object_com)
         world = WorldState(
@@ -188,13 +188,16 @@ class Core:
         Raises:
           LostWorldError: (native engine) a world is not finite any more, which `step` only flags.
         """
-        physics, view = self._physics_step(physics, ctrl)
-        return self._after_physics(physics, view, states, controllers, grasps)
+        physics, view = self.physics_step(physics, ctrl)
+        return self.after_physics(physics, view, states, controllers, grasps)
 
-    def _after_physics(
+    def after_physics(
         self, physics: Physics, view: PhysicsView, states: States, controllers: tuple[Any, ...], grasps: Held
     ) -> Advanced:
-        """The rest of a control step: states and goal, what slicing moves, grasps."""
+        """The rest of a control step: states and goal, what slicing moves, grasps.
+
+        With `physics_step` it is `advance_fn` in two parts, for callers that keep the physics between them.
+        """
         view = self.cameras.placed(view, controllers)
         physics, view, states, status = self._apply_rules(physics, view, states, controllers)
         physics, after, grasps = self.hands.act(physics, view, grasps, controllers)
@@ -257,7 +260,7 @@ class Core:
             with watch():
                 return self.engine.step(physics, ctrl)
 
-        self._physics_step = watched
+        self.physics_step = watched
 
     # Episodes.
 

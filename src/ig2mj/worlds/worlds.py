@@ -79,7 +79,8 @@ class Worlds(Face):
 
     def __repr__(self) -> str:
         engine = self.core.engine
-        count = f"{engine.num_worlds} world{'s' * (engine.num_worlds != 1)}"
+        number = engine.num_worlds
+        count = f"{number} world{'s' * (number != 1)}"
         return f"Worlds('{self.scene.name}', {count}, engine '{engine.name}')"
 
 
