@@ -31,6 +31,7 @@ def collected(cooking_meat, tmp_path_factory):
     return file, found["failed"]
 
 
+@pytest.mark.slow
 def test_a_collection_holds_successful_runs_with_labels_and_observations(cooking_meat, collected):
     file, failed = collected
     with Recording(file) as recording:
@@ -45,6 +46,7 @@ def test_a_collection_holds_successful_runs_with_labels_and_observations(cooking
             assert run.kept(0, 4).tolist() == [True, False, False, False]
 
 
+@pytest.mark.slow
 def test_a_collection_replays_bit_for_bit_with_the_recorded_observations(cooking_meat, collected):
     with Recording(collected[0]) as recording:
         recorded = {run.name: run.all_rows("obs/proprioception") for run in recording.runs}
@@ -58,6 +60,7 @@ def test_a_collection_replays_bit_for_bit_with_the_recorded_observations(cooking
     assert done.runs == 2 and not done.differences
 
 
+@pytest.mark.slow
 def test_networks_learn_from_recorded_and_from_replayed_observations_alike(cooking_meat, collected, tmp_path):
     file, _ = collected
     perception = Perception(cooking_meat.observation_spaces)
@@ -75,6 +78,7 @@ def test_networks_learn_from_recorded_and_from_replayed_observations_alike(cooki
     assert np.array_equal(read.label, replayed.label) and np.array_equal(read.action, replayed.action)
 
 
+@pytest.mark.slow
 def test_metrics_of_a_compact_recording_are_of_all_frames(cooking_meat, collected):
     for run in metrics_of(collected[0], settle=0, env=cooking_meat):
         assert len(run["goal"]["each_frame"]) == run["frames"] > 10

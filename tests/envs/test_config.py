@@ -110,6 +110,7 @@ def test_names_of_other_libraries_for_the_number_of_worlds_are_understood():
         gymnasium.make_vec("ig2mj/PointNavigation-v0", num_envs=2, worlds=4)
 
 
+@pytest.mark.slow
 def test_all_forms_make_the_same_environment_and_it_can_be_made_again():
     options = {"robot": "turtlebot", "worlds": 2, "period": 1 / 30, "observations": "proprioception", **SMALL}
     config = ig2mj.default_config("PointNavigation").override(options)
