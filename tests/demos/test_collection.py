@@ -147,6 +147,7 @@ def test_a_demonstrations_file_of_0_1_0_is_converted_to_learn_from(old, tmp_path
                 Replayer(recording)
 
 
+@pytest.mark.slow
 def test_what_is_no_demonstrations_file_is_not_converted(old, collected, tmp_path):
     with pytest.raises(InputError, match=r"is a demonstrations file of ig2mj 0\.1\.0 .*demos convert .*old\.h5 NEW"):
         Recording(old)
