@@ -114,7 +114,7 @@ def trained(
     env: Environment, perception: Perception, demos: Demos, steps: int, batch: int, seed: int
 ) -> tuple[Policy, float]:
     """A clone, and its loss on the tenth of the steps that is kept apart."""
-    config = BCConfig(num_updates=steps, batch=batch, input_noise=0.02, actor_layers=(256, 256))
+    config = BCConfig(num_updates=steps, batch_size=batch, input_noise=0.02, actor_layers=(256, 256))
     algorithm = BC(perception, demos.action.shape[1], config)
     learner, row = clone(algorithm, demos, Run(minutes=600, seed=seed, quiet=True))
     depends = depends_on(env, perception)

@@ -26,6 +26,7 @@ import pstats
 import subprocess
 import sys
 import time
+from typing import Literal
 
 from benchmarks.harness.paths import environment, module
 
@@ -33,7 +34,7 @@ BEGAN = "COLD_START_BEGAN"
 """Variable with the time at which the process was started."""
 
 
-def measure(what: str, worlds: int, beforehand: bool | str, cache: pathlib.Path) -> dict:
+def measure(what: str, worlds: int, beforehand: bool | Literal["meanwhile"], cache: pathlib.Path) -> dict:
     """Phases of this process. `beforehand`: `compile_beforehand` of the engine."""
     process_began = float(os.environ[BEGAN])
     began = time.perf_counter() - (time.time() - process_began)

@@ -10,7 +10,6 @@ together they time together. It takes all GPUs that it sees.
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import pathlib
@@ -110,10 +109,11 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
     """
     import ig2mj
     from ig2mj.envs.registry import VECTORS
-    from ig2mj.learn.algorithms import config_of, make_algorithm
+    from ig2mj.learn.algorithms import make_algorithm
     from ig2mj.learn.checkpoints import Checkpoints
     from ig2mj.learn.iteration import AXIS, ManyDevices, OneDevice
     from ig2mj.learn.perception import Perception
+    from ig2mj.learn.sac import SAC, SACConfig
 
     worlds, count, moves = settings["worlds"], jax.device_count(), Moves()
     apart = count > 1 or settings["apart"]
@@ -121,11 +121,10 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
     env: Any = ig2mj.make(
         settings["env"], worlds=worlds, engine=settings["engine"], observations=names, pool_size=settings["pool_size"]
     )
-    config: Any = dataclasses.replace(
-        config_of("sac"), batch_size=settings["batch"] * count, buffer_size=settings["capacity"] * count
-    )
+    config = SACConfig(batch_size=settings["batch"] * count, buffer_size=settings["capacity"] * count)
     perception = Perception(env.observation_spaces, settings["obs"])
     sac = make_algorithm(config, perception, env, None, AXIS if apart else None)
+    assert isinstance(sac, SAC)
     step: Any = ManyDevices(env, sac, jax.devices(), team) if apart else OneDevice(env, sac)
     held, memory_, key = *step.place(sac.init(jax.random.PRNGKey(0)), step.buffer()), jax.random.PRNGKey(1)
     play = step.begin(0)
@@ -177,8 +176,8 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
                 key = np.asarray(jax.random.fold_in(state[3], k))
                 state[0], state[1], *_ = step.learn(state[0], state[1], rollouts, sums, key, 0.1, True)
 
-        profiled_to(file, traced, PROFILED * sac.samples)
-        return {"updates": PROFILED * sac.samples}
+        profiled_to(file, traced, PROFILED * sac.updates)
+        return {"updates": PROFILED * sac.updates}
 
     with tempfile.TemporaryDirectory() as folder:
         kept = Checkpoints(folder).save(1, {"learner": jax.device_get(state[0])}, {})
@@ -186,8 +185,8 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
     about = {
         "parameters": parts,
         "checkpoint_bytes": size,
-        "replay_bytes_per_step": _bytes(state[1]) // (config.capacity // count),
-        "updates_of_the_critics_per_update_of_the_actor": config.every,
+        "replay_bytes_per_step": _bytes(state[1]) // (config.buffer_size // count),
+        "updates_of_the_critics_per_update_of_the_actor": config.policy_delay,
     }
     return {**about, **memory(worlds)}, measure, profile
 

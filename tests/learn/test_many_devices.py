@@ -8,7 +8,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import jax
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from small_envs import PointMass
+
+from ig2mj.errors import EngineError
+from ig2mj.learn.iteration import AXIS, ManyDevices
+from ig2mj.learn.perception import Perception
+from ig2mj.learn.sac import SAC, SACConfig
 
 SCRIPT = """
 import dataclasses, json, sys
@@ -62,3 +72,10 @@ def test_two_devices_learn_together(tmp_path):
         assert 0 < found[name]["shares"] < 1
     assert found["ppo"]["success"] > 0.85
     assert found["resumed"] == 16
+
+
+def test_a_batch_that_the_devices_cannot_share_evenly_is_refused():
+    env = PointMass(4)
+    sac = SAC(Perception(env.observation_spaces), 2, SACConfig(batch_size=63), AXIS)
+    with pytest.raises(EngineError, match="a batch of 63 samples cannot be shared by 2 devices: --set batch_size="):
+        ManyDevices(env, sac, jax.devices() * 2)

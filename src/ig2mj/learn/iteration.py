@@ -163,9 +163,11 @@ class ManyDevices:
         if not env.pure:
             raise EngineError("several devices need an engine that runs on devices (warp or jax)")
         own = [d for d in devices if d.process_index == jax.process_index()]
-        batch = getattr(algorithm.config, "batch", 0)
+        batch = getattr(algorithm.config, "batch_size", 0)
         if batch % len(devices):
-            raise EngineError(f"a batch of {batch} samples cannot be shared by {len(devices)} devices: --set batch=...")
+            raise EngineError(
+                f"a batch of {batch} samples cannot be shared by {len(devices)} devices: --set batch_size=..."
+            )
         env.prepare_devices(own)
         self._env, self._algorithm, self._devices, self._team = env, algorithm, own, team or Team()
         self._first, self._count = list(devices).index(own[0]), len(devices)
