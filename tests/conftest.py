@@ -152,3 +152,19 @@ def cooking_meat():
     import ig2mj
 
     return ig2mj.make("CookingMeat", worlds=2, engine="native", pool_size=4)
+
+
+@pytest.fixture(scope="session")
+def cup(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of an object of one's own, see tests/own_objects.py."""
+    from own_objects import write_cup
+
+    return write_cup(tmp_path_factory.mktemp("objects"))
+
+
+@pytest.fixture
+def own_configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A user's configuration of the test alone, without libraries of objects."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "configuration"))
+    monkeypatch.delenv("IG2MJ_OBJECTS", raising=False)
+    return tmp_path / "configuration"

@@ -21,6 +21,7 @@ from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process.deprecation import warn_renamed
+from ig2mj.scene.scene import Objects
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.pool import Pool
@@ -85,6 +86,7 @@ class Overrides(EngineOptions, total=False):
     horizon: int | None
     variant: int
     home: str | os.PathLike | None
+    objects: Objects
     engine_options: EngineOptions
 
 
@@ -143,6 +145,10 @@ class EnvConfig:
         its own start states.
       home: a home in place of the task's, by name or folder: any with a floor map for navigation, any that the
         activity can be bound in for BDDL, and one with the furniture that the task names for the paper's activities.
+      objects: what is added to the home, folders that `ig2mj convert object` wrote or names of the object library, each
+        with a place if it has one (`ig2mj.load_scene`). In the paper's activities and in tasks of your own,
+        "obj/mug@on_top:breakfast_table_0" is a further condition of the start states: the mug is in another place in
+        each of them. They are sampled on first use.
       engine_options: see `EngineOptions`.
     """
 
@@ -163,6 +169,7 @@ class EnvConfig:
     horizon: int | None = None
     variant: int = 0
     home: str | os.PathLike | None = None
+    objects: Objects = ()
     engine_options: EngineOptions = dataclasses.field(default_factory=lambda: EngineOptions())
 
     def override(self, overrides: Mapping[str, Any] | None = None, **more: Any) -> EnvConfig:

@@ -26,6 +26,7 @@ from ig2mj.envs.setups import Control, setup_activity, setup_bddl, setup_navigat
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.sensors.suite import SensorSuite
+from ig2mj.tasks.added_objects import canonical, requests, with_objects
 from ig2mj.tasks.bddl.task import BddlTask, bddl_task
 from ig2mj.tasks.homes import AnyTask, in_home
 from ig2mj.tasks.mixing import mixed_pool
@@ -141,6 +142,7 @@ def make(
 def _make(task: AnyTask, config: EnvConfig) -> Environment:
     if config.home is not None:
         task = in_home(task, config.home)
+    objects = tuple(canonical(request) for request in requests(config.objects))
     observations = (config.observations,) if isinstance(config.observations, str) else tuple(config.observations)
     mode = task.grasping if config.grasping is None else config.grasping
     if mode not in MODES:
@@ -151,6 +153,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         raise EngineError(f"variant {config.variant} of {task.name}: only the paper's activities have variants")
     elif config.relaxed_thresholds:
         raise EngineError(f"relaxed_thresholds for {task.name}: only the paper's activities have them")
+    task = with_objects(task, objects)
     if isinstance(task, NavigationTask) and config.pool is not None:
         raise EngineError(f"a pool for {task.name}: navigation draws its own start states")
     robot = next(iter(task.robots)) if config.robot is None else config.robot
@@ -199,6 +202,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         # Of a BDDL activity fewer rows than asked for may be good, and its robot stands where the first row wants it.
         pool_size=pool_size if isinstance(task, BddlTask) else rows,
         home=None if config.home is None else task.home,
+        objects=objects,
     )
     return Environment(
         task,

@@ -148,9 +148,10 @@ def setup_navigation(
     check_able(task, name, first)
     others = [TurtleBot(name=f"other_{k}") for k in range(task.others)]
     robots: list[Robot] = [first, *others]
-    scene = load_scene(task.home, agents=robots, objects=task.objects)
+    objects = (*task.objects, *task.added)
+    scene = load_scene(task.home, agents=robots, objects=objects)
     rules = Rules.of_scene(scene)
-    starts = make_starts(task, load_scene(task.home, objects=task.objects), scene, rules.initial, split, count)
+    starts = make_starts(task, load_scene(task.home, objects=objects), scene, rules.initial, split, count)
     controllers = tuple(r.controller(scene.tables, k, control.period) for k, r in enumerate(robots))
     arm = task.goal in ("reach", "close")
     companions = None
@@ -184,7 +185,7 @@ def setup_bddl(
     rows = pool if pool is not None else activity_pool(task, split, count)
     x, y = standing_place(task, rows)
     body = body.at(x, y, 0.0)
-    scene = load_scene(task.home, agents=[body], objects=task.binding.additions)
+    scene = load_scene(task.home, agents=[body], objects=(*task.binding.additions, *task.added))
     rules = Rules.of_scene(scene)
     goal = conditions(task.binding).compile_goal(rules.model)
     controller = control.controller(body, scene)

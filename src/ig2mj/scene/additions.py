@@ -1,8 +1,9 @@
-"""Objects of the library added to a home: its MJCF and its manifest with them, before anything is compiled.
+"""Objects added to a home: its MJCF and its manifest with them, before anything is compiled.
 
-Additions are named `<category>_<n>`, `n` going on where the home's own stop, and stand at rest on a slab of their own
-far outside the house until they are put somewhere; their halves, where they can be sliced, wait there parked. They come
-after the home's own objects, bodies and joints, so that indices of those stay what they were.
+An addition is named `<prefix>_<n>`, `n` going on where the home's own stop; the prefix is the category of a model of a
+library, and the name of the folder of any other. Without a place it stands at rest on a slab far outside the house
+until it is put somewhere; halves, where it can be sliced, wait there parked. Additions come after the home's own
+objects, bodies and joints, so that indices of those stay what they were.
 """
 
 from __future__ import annotations
@@ -16,12 +17,15 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Sequence
 
 import msgspec
+import mujoco
+import numpy as np
 
-from ig2mj.errors import Ig2mjError
+from ig2mj.errors import Ig2mjError, InputError
 from ig2mj.scene.library import LibraryModel, find_model
 from ig2mj.scene.manifest import JointEntry, LinkEntry, Manifest, ObjectEntry, OpenableEntry
 from ig2mj.scene.mjcf_files import read_mjcf
 from ig2mj.scene.mjcf_text import make_absolute, rename
+from ig2mj.scene.object_requests import ObjectRequest, Place, Pose, frame_of, read_request
 from ig2mj.scene.resting import rest
 
 SLAB = "additions_slab"
@@ -33,18 +37,19 @@ CLEARANCE = 0.15
 """Free space (m) between what stands there."""
 CONSTRAINTS = ("contact", "equality", "tendon")
 """Sections of an object's file by which its bodies and joints depend on each other."""
-
-Place = tuple[float, float, float, float]
-"""x, y, z (m) of an object's frame, and degrees that it is turned about the vertical."""
+COMPILED_BY = ("angle", "eulerseq", "coordinate")
+"""Settings of <compiler> that change what a number means: an object's must be the home's."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Addition:
-    """An object of the library in a scene.
+    """An object that was added to a scene.
 
     Attributes:
-      name: in the scene. category, model: of the library. sha256: of the model (`LibraryModel.sha256`).
-      place: where it is fixed; None: it can be moved.
+      name: in the scene. category, model: what it is. sha256: of the model (`LibraryModel.sha256`).
+      place: where it is fixed; None: it can be moved. start: where it starts, free to move; None: on the slab.
+      folder: where the files of a model of the user's own lie; None: of the library that ships.
+      named: it was added by its folder, and is named after it.
     """
 
     name: str
@@ -52,122 +57,214 @@ class Addition:
     model: str
     sha256: str
     place: Place | None = None
+    start: Place | Pose | None = None
+    folder: str | None = None
+    named: bool = False
+
+    @property
+    def reference(self) -> str:
+        """What `find_model` finds its model by."""
+        return self.folder if self.named and self.folder else f"{self.category}/{self.model}"
 
     @property
     def wanted(self) -> str:
         """What `load_scene(objects=...)` takes for it."""
-        fixed = "" if self.place is None else f"@{','.join(f'{v:g}' for v in self.place)}"
-        return f"{self.category}/{self.model}{fixed}"
+        if self.start is not None:
+            return f"{self.reference}@loose:{_numbers(self.start, ',')}"
+        if self.place is None:
+            return self.reference
+        kind = "" if self.folder is None else "fixed:"
+        return f"{self.reference}@{kind}{_numbers(self.place, ',')}"
 
-
-def place_of(wanted: str) -> tuple[str, Place | None]:
-    """The model's name, and where it is fixed: "shelf/shelf_14@1,2,0.9,-90". Raises Ig2mjError: it is neither."""
-    if not isinstance(wanted, str):
-        raise Ig2mjError(f"objects: {wanted!r} is not a name of the object library, such as 'plate'")
-    name, mark, place = wanted.partition("@")
-    if not mark:
-        return name, None
-    try:
-        x, y, z, yaw = map(float, place.split(","))
-    except ValueError:
-        raise Ig2mjError(f"'{wanted}': the pose of a fixed object is x,y,z,yaw in metres and degrees") from None
-    return name, (x, y, z, yaw)
+    def find(self) -> LibraryModel:
+        """Its model, read again. Raises as `find_model`."""
+        return find_model(self.reference)
 
 
 def name_additions(taken: Iterable[str], wanted: Sequence[str]) -> list[tuple[str, LibraryModel]]:
-    """The names that `wanted` get ("apple", or "apple/apple_00") in a scene whose objects have the names `taken`.
+    """The names that `wanted` get ("apple", "apple/apple_00" or a folder) in a scene whose objects are named `taken`.
 
     Raises:
-      UnknownNameError: the library has no such category or model. Ig2mjError: a place is not four numbers.
+      UnknownNameError: the library has no such category or model. Ig2mjError: a place is none.
     """
+    return name_models(taken, [find_model(read_request(name).reference) for name in wanted])
+
+
+def name_models(taken: Iterable[str], models: Sequence[LibraryModel]) -> list[tuple[str, LibraryModel]]:
+    """The names that objects of these models get in a scene whose objects are named `taken`."""
     names = set(taken)
     numbers: dict[str, int] = {}
     for name in names:
         if match := re.fullmatch(r"(.+)_(\d+)", name):
             numbers[match[1]] = max(numbers.get(match[1], -1), int(match[2]))
     found = []
-    for model in (find_model(place_of(name)[0]) for name in wanted):
-        number = numbers.get(model.category, -1) + 1
-        while f"{model.category}_{number}" in names:
+    for model in models:
+        number = numbers.get(model.prefix, -1) + 1
+        while f"{model.prefix}_{number}" in names:
             number += 1
-        numbers[model.category] = number
-        found.append((f"{model.category}_{number}", model))
+        numbers[model.prefix] = number
+        found.append((f"{model.prefix}_{number}", model))
         names.add(found[-1][0])
     return found
 
 
-def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -> tuple[str, Manifest, list[Addition]]:
-    """A home with objects of the library.
-
-    Args:
-      file: its scene.xml. manifest: its manifest; not changed.
-      wanted: what is added, in this order: "apple" or "apple/apple_00"; "shelf/shelf_14@1,2,0.9,-90" is fixed there.
-
-    Returns:
-      MJCF whose paths are absolute, the manifest with all entries, what was added.
+def plan_additions(manifest: Manifest, requests: Sequence[ObjectRequest]) -> list[tuple[Addition, LibraryModel]]:
+    """What is added to a home for these requests, in this order. Predicates are left to `load_scene`.
 
     Raises:
-      UnknownNameError: the library has no such model. InputError: a file is not MJCF. Ig2mjError: a fixed model has
-      no place.
+      UnknownNameError: there is no such model. Ig2mjError: a fixed model has no place.
+    """
+    models = [find_model(request.reference) for request in requests]
+    found = []
+    for (name, model), request in zip(name_models((o.name for o in manifest.objects), models), requests, strict=True):
+        fixed = model.entry.fixed
+        if fixed and request.place is None:
+            raise Ig2mjError(f"'{request.text}' is fixed: give its pose, as in '{request.reference}@1,2,0.9,-90'")
+        if request.place is not None and request.kind != "loose" and (request.kind or fixed or not model.own):
+            fixed, place, start = True, request.place[:4], None
+        else:
+            if fixed and request.kind == "loose":
+                fix = "convert it without --fixed"
+                raise Ig2mjError(f"'{request.text}' is fixed and cannot be loose ({fix})")
+            place, start = None, request.place
+        folder = str(model.folder) if model.own else None
+        addition = Addition(name, model.category, model.model, model.sha256, place, start, folder, model.named)
+        found.append((addition, model))
+    return found
+
+
+def add_objects(
+    file: pathlib.Path, manifest: Manifest, planned: Sequence[tuple[Addition, LibraryModel]]
+) -> tuple[str, Manifest]:
+    """A home with objects added.
+
+    Args:
+      file: its scene.xml. manifest: its manifest; not changed. planned: as of `plan_additions`.
+
+    Returns:
+      MJCF whose paths are absolute, and the manifest with all entries.
+
+    Raises:
+      InputError: a file is not MJCF, or one of an object does not fit the home's.
     """
     root = read_mjcf(file)
     make_absolute(root, file.parent)
-    world, assets = _child(root, "worldbody"), _child(root, "asset")
-    known = {(e.tag, e.get("name")) for e in assets}
-    named = name_additions((o.name for o in manifest.objects), wanted)
-    places = [place_of(name)[1] for name in wanted]
-    for (_, model), at in zip(named, places, strict=True):
-        if model.entry.fixed and at is None:
-            raise Ig2mjError(
-                f"'{model.category}/{model.model}' is fixed: give its pose, as in '{model.category}@1,2,0.9,-90'"
-            )
-    loose = [o for (_, model), at in zip(named, places, strict=True) if at is None for o in model.manifest.objects]
-    cells = _add_slab(root, loose) if loose else []
+    world = _child(root, "worldbody")
+    waiting = [o for a, model in planned if a.place is None for o in _parked(a, model)]
+    cells = _add_slab(root, waiting) if waiting else []
     start: list[list[float]] = []
     standing: list[tuple[ElementTree.Element, int]] = []
-    place = iter(cells)
-    for (name, model), at in zip(named, places, strict=True):
+    cell = iter(cells)
+    for addition, model in planned:
+        name = addition.name
         added = read_mjcf(model.file)
         make_absolute(added, model.folder)
         _rename(added, model.entry.name, name)
-        _take_defaults(root, added)
-        for asset in _child(added, "asset"):
-            key = (asset.tag, asset.get("name"))
-            if key not in known and asset.get("builtin") is None and asset.get("name") != "ground":
-                known.add(key)
-                assets.append(asset)
+        if model.own:
+            _check_compiler(root, added, model.file)
+        _take_assets(root, added, name, model.own)
         poses = _start_values(added)
         bodies = {body.get("name"): body for body in _child(added, "worldbody").findall("body")}
         for tag in CONSTRAINTS:
             for element in added.iter(tag):
                 _child(root, tag).extend(element)
-        if at is not None:
-            _fix(bodies[name], at)
-            start.append(poses[name][1])
-            world.append(bodies[name])
-            continue
-        for entry in model.manifest.objects:
-            x, y = next(place)
-            roots = [bodies[f"{name}{body.removeprefix(model.entry.name)}"] for body in entry.bodies]
-            origin = poses[str(roots[0].get("name"))][0]
-            for body in roots:
-                values, inner = poses[str(body.get("name"))]
-                values = [values[0] - origin[0] + x, values[1] - origin[1] + y, values[2] + HEIGHT, *values[3:]]
-                standing.append((body, len(start)))
-                start.append([*values, *inner])
+        entries = model.manifest.objects if addition.place is None else model.manifest.objects[:1]
+        for entry in entries:
+            roots = [_body_of(bodies, f"{name}{b.removeprefix(model.entry.name)}", model) for b in entry.bodies]
+            own = [poses[str(body.get("name"))] for body in roots]
+            frame = addition.place or addition.start
+            if frame is not None and entry is model.entry:
+                moved = _moved([values for values, _ in own], frame_of(frame))
+            else:
+                x, y = next(cell)
+                origin = own[0][0]
+                moved = [[v[0] - origin[0] + x, v[1] - origin[1] + y, v[2] + HEIGHT, *v[3:]] for v, _ in own]
+                standing += [(body, len(start) + k) for k, body in enumerate(roots)]
+            for body, values, (_, inner) in zip(roots, moved, own, strict=True):
+                body.set("pos", _numbers(values[:3]))
+                body.set("quat", _numbers(values[3:]))
+                free = body is not roots[0] or addition.place is None
+                if not free:
+                    _fix(body)
+                start.append([*values, *inner] if free else list(inner))
                 world.append(body)
     if standing:
         _lay_down(root, standing, start)
     _extend_key(root, [value for values in start for value in values])
     merged = copy.copy(manifest)
     merged.objects = list(manifest.objects)
-    for (name, model), at in zip(named, places, strict=True):
-        entries = [_entry(o, model.entry.name, name) for o in model.manifest.objects]
-        if at is not None:
+    for addition, model in planned:
+        entries = [_entry(o, model.entry.name, addition.name) for o in model.manifest.objects]
+        if addition.place is not None:
             entries = [msgspec.structs.replace(entries[0], fixed=True, assisted_grasp=False)]
         merged.objects += entries
-    additions = [Addition(name, m.category, m.model, m.sha256, at) for (name, m), at in zip(named, places, strict=True)]
-    return ElementTree.tostring(root, encoding="unicode"), merged, additions
+    return ElementTree.tostring(root, encoding="unicode"), merged
+
+
+def _parked(addition: Addition, model: LibraryModel) -> list[ObjectEntry]:
+    """Of an object and its halves what waits on the slab."""
+    return [o for o in model.manifest.objects if o is not model.entry or addition.start is None]
+
+
+def _body_of(bodies: dict[str | None, ElementTree.Element], name: str, model: LibraryModel) -> ElementTree.Element:
+    if name not in bodies:
+        problem = "names a body that object.xml does not have"
+        raise InputError(model.folder / "manifest.json", problem, element=name, fix="convert the object again")
+    return bodies[name]
+
+
+def _moved(poses: Sequence[Sequence[float]], frame: Pose) -> list[list[float]]:
+    """Poses of an object's root bodies, the base first, when the base is at `frame`."""
+    there, turn, back = np.array(frame[:3]), np.array(frame[3:]), np.zeros(4)
+    base = np.array(poses[0], float)
+    mujoco.mju_negQuat(back, base[3:])
+    mujoco.mju_mulQuat(back, turn, back.copy())
+    found = [list(frame)]
+    for pose in poses[1:]:
+        offset, quat = np.zeros(3), np.zeros(4)
+        mujoco.mju_rotVecQuat(offset, np.array(pose[:3], float) - base[:3], back)
+        mujoco.mju_mulQuat(quat, back, np.array(pose[3:], float))
+        found.append([*(there + offset).tolist(), *quat.tolist()])
+    return found
+
+
+def _check_compiler(root: ElementTree.Element, added: ElementTree.Element, file: pathlib.Path) -> None:
+    """Raises InputError where the object's numbers mean something else than the home's."""
+    home, own = (dict(e.attrib) if (e := r.find("compiler")) is not None else {} for r in (root, added))
+    for name in COMPILED_BY:
+        if own.get(name) != home.get(name):
+            problem = f"has {name}={own.get(name)!r}, the home {home.get(name)!r}"
+            raise InputError(file, problem, element="<compiler>", fix="convert the object again")
+
+
+def _take_assets(root: ElementTree.Element, added: ElementTree.Element, name: str, own: bool) -> None:
+    """Takes over an object's assets and default classes; what the home has already is shared.
+
+    own: the object is of the user's own: what the home has under the same name with other content is then renamed
+    `<object>/<name>`.
+    """
+    assets, defaults = _child(root, "asset"), _child(root, "default")
+    given = [a for a in _child(added, "asset") if a.get("builtin") is None and a.get("name") != "ground"]
+    classes = _child(added, "default").findall("default")
+    known = {_asset_key(e): e for e in (*assets, *defaults.findall("default"))}
+    if own and any(_content(known[k]) != _content(e) for e in (*given, *classes) if (k := _asset_key(e)) in known):
+        rename(added, lambda value: value, lambda value: f"{name}/{value}")
+    assets.extend(e for e in given if _asset_key(e) not in known)
+    defaults.extend(e for e in classes if _asset_key(e) not in known)
+
+
+def _asset_key(element: ElementTree.Element) -> tuple[str, str]:
+    return element.tag, element.get("name", element.get("class")) or pathlib.PurePath(element.get("file", "")).stem
+
+
+def _content(element: ElementTree.Element) -> str:
+    """An element as text, in which a file counts by its name: names of meshes and images have a hash of the content."""
+    plain = copy.deepcopy(element)
+    for e in plain.iter():
+        e.tail = None
+        if file := e.get("file"):
+            e.set("file", pathlib.PurePath(file).name)
+    return ElementTree.tostring(plain, encoding="unicode")
 
 
 def _child(root: ElementTree.Element, tag: str) -> ElementTree.Element:
@@ -192,22 +289,10 @@ def _rename(root: ElementTree.Element, old: str, new: str) -> None:
     rename(root, named)
 
 
-def _take_defaults(root: ElementTree.Element, added: ElementTree.Element) -> None:
-    """Takes over default classes that the home does not have."""
-    known = {element.get("class") for element in root.iter("default")}
-    target = _child(root, "default")
-    for element in _child(added, "default").findall("default"):
-        if element.get("class") not in known:
-            target.append(element)
-
-
-def _fix(body: ElementTree.Element, place: Place) -> None:
-    """Takes the free joint from a body and puts it in its place for good."""
+def _fix(body: ElementTree.Element) -> None:
+    """Takes the free joint from a body."""
     for joint in [j for j in body if j.tag == "freejoint" or j.get("type") == "free"]:
         body.remove(joint)
-    half = math.radians(place[3]) / 2
-    body.set("pos", _numbers(place[:3]))
-    body.set("quat", _numbers([math.cos(half), 0.0, 0.0, math.sin(half)]))
 
 
 def _add_slab(root: ElementTree.Element, entries: Sequence[ObjectEntry]) -> list[tuple[float, float]]:
@@ -290,5 +375,5 @@ def _entry(o: ObjectEntry, old: str, new: str) -> ObjectEntry:
     )
 
 
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{v:.9g}" for v in values)
+def _numbers(values: Iterable[float], between: str = " ") -> str:
+    return between.join(f"{v:.9g}" for v in values)

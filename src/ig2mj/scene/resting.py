@@ -87,7 +87,7 @@ def _extract(
         solid = copy.deepcopy(body)
         for parent in list(solid.iter("body")):
             for child in list(parent):
-                if child.tag in UNSEEN or (child.tag == "geom" and child.get("class") == "visual"):
+                if child.tag in UNSEEN or (child.tag == "geom" and child.get("class", "").endswith("visual")):
                     parent.remove(child)
                 child.attrib.pop("material", None)
         world.append(solid)

@@ -14,17 +14,18 @@ from typing import Protocol, runtime_checkable
 
 import mujoco
 
+from ig2mj.cluster.jobs import import_function
 from ig2mj.errors import Ig2mjError, InputError, ManifestError, UnknownNameError, without_lines
 from ig2mj.files.inside import inside
-from ig2mj.scene.additions import Addition, add_objects
+from ig2mj.scene.additions import Addition, add_objects, plan_additions
 from ig2mj.scene.build_tables import build_tables
 from ig2mj.scene.ceilings import add_ceiling
 from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
-from ig2mj.scene.library import find_model
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.mjcf_files import read_mjcf
 from ig2mj.scene.mjcf_limits import check_mjcf
+from ig2mj.scene.object_requests import ObjectRequest, Pose, read_request
 from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
 from ig2mj.scene.physics_digest import physics_digest
 from ig2mj.scene.rooms import Rooms, load_rooms
@@ -59,7 +60,7 @@ class Scene:
       tables: its constants as arrays.
       rooms: room maps, or None.
       agents: what was attached when it was loaded, in the order of the A axis.
-      additions: objects of the library that were added when it was loaded; they come last on the O axis.
+      additions: objects that were added when it was loaded; they come last on the O axis.
     """
 
     folder: pathlib.Path
@@ -87,8 +88,9 @@ class Scene:
         hashed.update(physics_digest(model_file(self.folder), load_manifest(self.folder / MANIFEST_FILE)).encode())
         hashed.update("\n".join(self.object_names).encode())
         for addition in self.additions:
-            model = find_model(f"{addition.category}/{addition.model}")
-            hashed.update(f"\n{model.physics_digest} {addition.place}".encode())
+            hashed.update(f"\n{addition.find().physics_digest} {addition.place}".encode())
+            if addition.start is not None:
+                hashed.update(f" {addition.start}".encode())
         return _known_digests().get(hashed.hexdigest(), hashed.hexdigest())
 
     @functools.cached_property
@@ -128,7 +130,8 @@ class Scene:
         file = model_file(self.folder)
         if self.additions:
             own = load_manifest(self.folder / MANIFEST_FILE)
-            spec = _spec_from_text(add_objects(file, own, [a.wanted for a in self.additions])[0], file)
+            text, _ = add_objects(file, own, [(a, a.find()) for a in self.additions])
+            spec = _spec_from_text(text, file)
         else:
             spec = read_spec(file)
         _make_solid(spec, self.manifest, self.folder)
@@ -164,29 +167,70 @@ def _make_solid(spec: mujoco.MjSpec, manifest: Manifest, folder: pathlib.Path) -
     deepen_walls(spec, manifest)
 
 
-def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: str | Sequence[str] = ()) -> Scene:
+Objects = str | os.PathLike | Sequence[str | os.PathLike]
+"""What is added to a home: one object, or several (`ig2mj.scene.object_requests` has the forms of one)."""
+
+PLACER = "ig2mj.sampling.start_places:sample_places"
+"""Samples where objects start of which a predicate is to hold: called with the scene, which has them outside the house,
+and (object, predicate, object or room) for each; gives their poses by name. Named by a text, since samplers are built
+on scenes."""
+
+
+def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: Objects = ()) -> Scene:
     """Loads a converted scene.
 
     Args:
       path: its folder, its scene.xml or its manifest.json, or the bare name of a home that ships with the project.
       agents: robots to compile into it, e.g. `FloatingHand(pos=(0, 0, 1))`.
-      objects: what to add from the object library, e.g. ["steak", "plate/plate_00"], or a single one. Additions are
-        named `<category>_<n>`, going on from the home's own, and stand outside the house until they are put somewhere.
-        "shelf/shelf_14@1,2,0.9,-90" is fixed for good: its frame at x, y, z (m), turned by degrees about the vertical.
+      objects: what is added, one object or several, each the folder that `ig2mj convert object` wrote, or a name of the
+        object library ("steak", "plate/plate_00"). With a place it starts there: "obj/mug@1,2,0.8,90" (its frame at x,
+        y, z in m, turned by degrees about the vertical), or "obj/mug@on_top:breakfast_table_0" (sampled, always the
+        same); without one it stands outside the house until it is put somewhere. An object from a folder is named
+        `<folder name>_<n>`, one of a library `<category>_<n>`; `n` goes on from the home's own. Objects of one's own
+        are loose at their place unless they were converted as fixed, those of the library that ships are fixed for
+        good; "fixed:" and "loose:" after the "@" say which.
 
     Raises:
-      InputError: a file is missing or is not valid MJCF. UnknownNameError: the library has no such object.
-      ManifestError: the manifest is broken, or does not belong to the scene.xml.
+      InputError: a file is missing or is not valid MJCF. UnknownNameError: there is no such folder and the library has
+        no such object. ManifestError: a manifest is broken, or does not belong to its MJCF. StateError: no place was
+        found at which the predicate holds.
     """
     file = model_file(path)
-    folder = file.parent
-    manifest = load_manifest(folder / MANIFEST_FILE)
-    additions: list[Addition] = []
-    objects = (objects,) if isinstance(objects, str) else objects
+    home = load_manifest(file.parent / MANIFEST_FILE)
+    requests = _requests(objects)
+    if any(request.predicate for request in requests):
+        plan = plan_additions(home, [dataclasses.replace(r, place=None) if r.predicate else r for r in requests])
+        names = [addition.name for addition, _ in plan]
+        asked = [(n, *r.predicate) for n, r in zip(names, requests, strict=True) if r.predicate]
+        poses: dict[str, Pose] = import_function(PLACER)(_load(file, home, (), requests), asked)
+        requests = [
+            dataclasses.replace(r, place=poses[n], kind="loose", predicate=None) if r.predicate else r
+            for n, r in zip(names, requests, strict=True)
+        ]
+    return _load(file, home, agents, requests)
+
+
+def scene_with(scene: Scene | str | os.PathLike, objects: Objects = ()) -> Scene:
+    """A loaded scene as it is, or what `load_scene` loads. Raises Ig2mjError: objects for a scene that is loaded."""
+    if not isinstance(scene, Scene):
+        return load_scene(scene, objects=objects)
+    if objects:
+        raise Ig2mjError(f"{scene.name} is loaded already: add objects with load_scene(..., objects=...)")
+    return scene
+
+
+def _requests(objects: Objects) -> list[ObjectRequest]:
     if isinstance(objects, Mapping):
         raise Ig2mjError(f"objects = {objects!r}: a list of names, one for each object to add")
-    if objects:
-        text, manifest, additions = add_objects(file, manifest, objects)
+    return [read_request(o) for o in ((objects,) if isinstance(objects, str | os.PathLike) else objects)]
+
+
+def _load(file: pathlib.Path, manifest: Manifest, agents: Sequence[Agent], requests: list[ObjectRequest]) -> Scene:
+    folder, additions = file.parent, list[Addition]()
+    if requests:
+        planned = plan_additions(manifest, requests)
+        text, manifest = add_objects(file, manifest, planned)
+        additions = [addition for addition, _ in planned]
         spec = _spec_from_text(text, file)
     else:
         spec = read_spec(file)
@@ -194,7 +238,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: s
     if agents:
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *_attach_all(agents, spec, manifest)]
-    model = _compile(spec, file, generated=bool(objects))
+    model = _compile(spec, file, generated=bool(requests))
     rooms = None
     if manifest.rooms.file:
         rooms = load_rooms(inside(manifest.rooms.file, folder, folder / MANIFEST_FILE, "rooms.file"))

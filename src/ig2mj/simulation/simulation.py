@@ -35,7 +35,7 @@ from ig2mj.process.deprecation import warn_renamed
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
-from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.scene.scene import Objects, Scene, scene_with
 from ig2mj.simulation import images
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
 from ig2mj.simulation.recording import Recorded
@@ -68,19 +68,21 @@ class Simulation(Recorded):
         states: StateOptions | None = DEFAULTS,
         seed: int = 0,
         grasping: str | Grasping = "physical",
+        objects: Objects = (),
         **options: Any,
     ):
         """Starts at the scene's initial state.
 
         Args:
           scene: a loaded scene, or what `load_scene` takes. engine: a name, or one made for this scene with one world.
+          objects: what is added to it (see `load_scene`); not to a scene that is loaded.
           states: how extended states behave; None: physics only. seed: of what `set_state` samples at random.
           grasping: how the robots' hands hold (see `ig2mj.Worlds`).
           options: go to the engine, where it is given by name, e.g. `boxes="igibson"`.
         """
         run_programs_inline()
         check_options("Simulation", options, engine, Simulation)
-        self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
+        self.scene = scene_with(scene, objects)
         self.engine: Engine = make_engine(engine, self.scene, 1, **options) if isinstance(engine, str) else engine
         if self.engine.num_worlds != 1:
             raise EngineError(f"a Simulation is one world, and the engine has {self.engine.num_worlds}")

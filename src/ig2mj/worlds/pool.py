@@ -24,8 +24,7 @@ from ig2mj.engine.layout import make_layout
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, counted, length
 from ig2mj.errors import InputError
-from ig2mj.scene.additions import Addition
-from ig2mj.scene.library import find_model
+from ig2mj.scene.found_again import AdditionEntry, entries_of, find_again
 from ig2mj.scene.paths import shipped_homes
 from ig2mj.scene.scene import Agent, Scene, load_scene
 from ig2mj.states.initial import initial_states
@@ -77,7 +76,7 @@ def save_pool(pool: Pool, file: str | os.PathLike, scene: Scene, note: dict[str,
         "format_version": FORMAT_VERSION,
         "scene": scene.name,
         "digest": scene.digest,
-        "additions": [dataclasses.asdict(a) for a in scene.additions],
+        "additions": entries_of(scene.additions),
     }
     save_tree(file, pool, {**header, **(note or {})})
 
@@ -91,20 +90,16 @@ def load_pool_scene(
       scene: the home, as of `load_scene`; None: the shipped one of the name that the pool says.
 
     Raises:
-      InputError: the file is not a pool, or is one of another home, or a model of the object library differs in more
-        than its looks from the one that was added. UnknownNameError: the library has no such model.
+      InputError: the file is not a pool, or is one of another home, or an object that was added is missing, or differs
+        in more than its looks. UnknownNameError: the library that ships has no such model.
     """
     header = _pool_header(file)
-    wanted, changed = [], []
-    for entry in header["additions"]:
-        model = find_model(f"{entry['category']}/{entry['model']}")
-        if model.sha256 != entry["sha256"]:
-            changed.append(f"{model.category}/{model.model}")
-        at = entry["place"]
-        wanted.append(Addition(**{**entry, "place": None if at is None else tuple(at)}).wanted)
+    entries = msgspec.convert(header["additions"], list[AdditionEntry])
+    additions = find_again([entry.addition() for entry in entries], file)
+    changed = [f"{a.category}/{a.model}" for a in additions if a.find().sha256 != a.sha256]
     if scene is None and header["scene"] not in shipped_homes():
         raise InputError(file, f"is of the home '{header['scene'][:60]}', which does not ship", fix="name its folder")
-    found = load_scene(header["scene"] if scene is None else scene, agents, wanted)
+    found = load_scene(header["scene"] if scene is None else scene, agents, [a.wanted for a in additions])
     if changed and not found.owns(header.get("digest")):
         raise InputError(file, f"was made with another '{changed[0]}' added", fix=_FIX)
     return found
@@ -195,19 +190,9 @@ def _pool_header(file: str | os.PathLike) -> dict[str, Any]:
     return {**header, "additions": msgspec.to_builtins(known.additions)}
 
 
-class _Added(msgspec.Struct):
-    """An `Addition` in a header."""
-
-    name: str
-    category: str
-    model: str
-    sha256: str
-    place: tuple[float, float, float, float] | None = None
-
-
 class _Header(msgspec.Struct):
     """What must be in a header."""
 
     scene: str
     digest: str | None = None
-    additions: list[_Added] = []
+    additions: list[AdditionEntry] = []

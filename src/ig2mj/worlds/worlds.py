@@ -20,7 +20,7 @@ from ig2mj.engine.registry import check_options, choose_engine, make_engine
 from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.predicates.logic import Expression
 from ig2mj.process import entry_point
-from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.scene.scene import Objects, Scene, scene_with
 from ig2mj.states.model import DEFAULTS
 from ig2mj.states.options import StateOptions
 from ig2mj.worlds.core import Core
@@ -48,6 +48,7 @@ class Worlds(Face):
         pool: Pool | None = None,
         states: StateOptions = DEFAULTS,
         grasping: str | Grasping = "physical",
+        objects: Objects = (),
         **options: Any,
     ):
         """Makes the worlds; `start` puts them at their start.
@@ -61,6 +62,7 @@ class Worlds(Face):
           states: how extended states behave.
           grasping: how the robots' hands hold, a name of `ig2mj.agents.grasping.MODES`: "physical" (by friction alone),
             "assisted" or "sticky"; or a `Grasping` of this scene, which "mitten" needs with its targets.
+          objects: what is added to the home (see `load_scene`); not to a scene that is loaded.
           options: go to the engine, where it is given by name.
 
         Raises:
@@ -69,7 +71,7 @@ class Worlds(Face):
           `load_scene` and `compile_expression`.
         """
         engine = choose_engine(engine)
-        self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
+        self.scene = scene_with(scene, objects)
         check_options("Worlds", options, engine, Worlds)
         if isinstance(engine, str):
             engine = make_engine(engine, self.scene, num_worlds, **options)

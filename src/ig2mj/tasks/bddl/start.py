@@ -95,9 +95,13 @@ def start_conditions(binding: Binding, scene: Scene) -> list[Condition]:
     return [*found, *(Condition("on_floor", (new, room)) for new, room in wanted if new not in placed)]
 
 
-def load_bound(binding: Binding, home: str | os.PathLike | None = None) -> Scene:
-    """The scene of a binding, with its additions. `home`: where it lies; default: the shipped one of that name."""
-    return load_scene(binding.home if home is None else home, objects=binding.additions)
+def load_bound(binding: Binding, home: str | os.PathLike | None = None, added: Sequence[str] = ()) -> Scene:
+    """The scene of a binding, with its additions.
+
+    Args:
+      home: where it lies; default: the shipped one of that name. added: further objects (see `load_scene`).
+    """
+    return load_scene(binding.home if home is None else home, objects=(*binding.additions, *added))
 
 
 HOMES = 3

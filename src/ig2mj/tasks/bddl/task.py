@@ -51,6 +51,7 @@ class BddlTask:
     Attributes:
       name: "activity/" and the activity's name. summary: one sentence. binding: which objects of the home play it.
       robots: names of those that can do it. horizon, grasping: as of `ig2mj.tasks.task.Task`.
+      added: further objects in the home (`ig2mj.tasks.added_objects`).
     """
 
     name: str
@@ -59,6 +60,7 @@ class BddlTask:
     robots: tuple[str, ...] = ("humanoid", "fetch")
     horizon: int = HORIZON
     grasping: str = "assisted"
+    added: tuple[str, ...] = ()
 
     @property
     def home(self) -> str:
@@ -127,7 +129,7 @@ def activity_states(task: BddlTask, split: str = "train") -> StartStates:
     """Where the start states are kept, and what they are made of. Raises UnknownNameError: no such split."""
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
-    bare = load_bound(task.binding)
+    bare = load_bound(task.binding, added=task.added)
     conditions = [c.expression for c in start_conditions(task.binding, bare)]
     short = task.name.removeprefix(PREFIX)
     return StartStates(
@@ -143,7 +145,7 @@ def standing_place(task: BddlTask, pool: Pool) -> tuple[float, float]:
     """
     import scipy.ndimage
 
-    probe = load_scene(task.home, agents=[TurtleBot()], objects=task.binding.additions)
+    probe = load_scene(task.home, agents=[TurtleBot()], objects=(*task.binding.additions, *task.added))
     own = probe.start_data().qpos.copy()
     row = np.asarray(pool.physics.scene.qpos)[0]
     own[: len(row)] = row

@@ -67,7 +67,8 @@ class NavigationObjective:
         self._goals, self._fields, self._shortest = starts.goals, starts.fields, starts.shortest
         self._ground = np.isin(np.array(tables.object_categories), GROUND)
         self._hand = int(np.flatnonzero(tables.hand_agent == 0)[0]) if task.goal == "reach" else -1
-        self._loose = np.array([scene.object_index(a.name) for a in scene.additions], int)
+        strewn = scene.additions[: len(task.objects)]
+        self._loose = np.array([scene.object_index(a.name) for a in strewn], int)
         self._height = float(starts.pool.physics.whole("qpos")[0, _free_address(scene) + 2])
         opened = np.isin(np.array(tables.object_categories)[tables.openable_object], task.opened)
         self._joints = np.flatnonzero(opened)

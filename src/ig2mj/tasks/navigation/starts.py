@@ -283,7 +283,7 @@ class _Households:
         opened = self._joints[rng.random(len(self._joints)) < OPEN_CHANCE]
         spots: dict[str, np.ndarray] = {}
         taken = keep_off
-        for addition in self._scene.additions:
+        for addition in self._scene.additions[: len(task.objects)]:
             for _ in range(TRIES):
                 xy = floor.centres(cells[rng.integers(len(cells), size=1)])[0]
                 if np.linalg.norm(taken - xy, axis=1).min() >= ROBOT_SEPARATION:

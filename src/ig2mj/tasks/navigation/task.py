@@ -19,6 +19,7 @@ class NavigationTask:
       goal: "point" (the base at a point of the floor), "reach" (the first hand at a point in the air) or "close"
         (furniture closed).
       objects: of the object library, put on free floor at random in every episode.
+      added: further objects, which stay where they are (`ig2mj.tasks.added_objects`).
       others: number of TurtleBots that move at random.
       opened: categories of furniture whose joints are opened at random.
       target_dist: m along the floor from the start to the target, least and most.
@@ -38,6 +39,7 @@ class NavigationTask:
     goal: str = "point"
     home: str = "birch"
     objects: tuple[str, ...] = ()
+    added: tuple[str, ...] = ()
     others: int = 0
     opened: tuple[str, ...] = ()
     target_dist: tuple[float, float] = (1.0, 10.0)

@@ -1,0 +1,72 @@
+"""Objects of the user's own that a file was made with (a pool, a recording, a policy), found again by their hash."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import msgspec
+
+from ig2mj.errors import InputError
+from ig2mj.scene.additions import Addition
+from ig2mj.scene.library import LibraryModel, folder_of, own_library, read_model
+
+
+class AdditionEntry(msgspec.Struct):
+    """An `Addition` in the header of a file."""
+
+    name: str
+    category: str
+    model: str
+    sha256: str
+    place: tuple[float, float, float, float] | None = None
+    start: tuple[float, ...] | None = None
+    folder: str | None = None
+    named: bool = False
+
+    def addition(self) -> Addition:
+        """The addition itself."""
+        return Addition(**{f.name: getattr(self, f.name) for f in dataclasses.fields(Addition)})
+
+
+def entries_of(additions: Iterable[Addition]) -> list[dict[str, Any]]:
+    """Additions for the header of a file."""
+    return [dataclasses.asdict(a) for a in additions]
+
+
+def find_again(additions: Sequence[Addition], file: str | os.PathLike) -> list[Addition]:
+    """The same additions with the folders where their models are now; those of the library that ships as they are.
+
+    A model is looked for in the folder where it was, and in the user's own libraries: first with the same hash, then
+    by its name, in case only its looks have changed. Whether its physics have is for the caller to check.
+
+    Args:
+      file: what was made with them, for errors.
+
+    Raises:
+      InputError: a model is missing; says which, and where it was.
+    """
+    return [a if a.folder is None else _found(a, file) for a in additions]
+
+
+def _found(addition: Addition, file: str | os.PathLike) -> Addition:
+    was = pathlib.Path(str(addition.folder))
+    known = [read_model(was, named=addition.named)] if folder_of(str(was)) is not None else []
+    if not known or known[0].sha256 != addition.sha256:
+        for models in own_library().values():
+            known += [read_model(m.folder, named=addition.named) for m in models.values()]
+    fitting = [m for m in known if not addition.named or m.prefix == addition.name.rpartition("_")[0]]
+    same = [m for m in fitting if m.sha256 == addition.sha256]
+    called = [m for m in fitting if _reference(m) == (addition.category, addition.model)]
+    if not (same or called):
+        what = f"the object '{addition.name}' ({addition.category}/{addition.model}, hash {addition.sha256[:12]})"
+        fix = f"`ig2mj objects add DIR` with the folder that holds its folder '{was.name}'"
+        raise InputError(file, f"needs {what}, which was in {was} and is there and in the libraries no more", fix=fix)
+    return dataclasses.replace(addition, folder=str((same or called)[0].folder))
+
+
+def _reference(model: LibraryModel) -> tuple[str, str]:
+    return model.category, model.model

@@ -1,0 +1,60 @@
+"""Tasks with objects of one's own in their home.
+
+env = ig2mj.make("CookingMeat", objects=["obj/mug@on_top:breakfast_table_0"])
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Sequence
+
+from ig2mj.errors import Ig2mjError
+from ig2mj.scene.additions import name_additions
+from ig2mj.scene.library import find_model
+from ig2mj.scene.manifest import load_manifest
+from ig2mj.scene.object_requests import ObjectRequest, read_request
+from ig2mj.scene.paths import scene_folder
+from ig2mj.scene.scene import Objects
+from ig2mj.tasks.homes import AnyTask
+from ig2mj.tasks.task import Task
+
+
+def with_objects(task: AnyTask, objects: Objects) -> AnyTask:
+    """The task in its home with these objects, as of `load_scene`.
+
+    In an activity of `Task` a predicate such as "@on_top:breakfast_table_0" is a further condition of the start states:
+    each of them has the object in another place. In other tasks it is placed once.
+
+    Raises:
+      UnknownNameError: there is no such object. Ig2mjError: a place is none.
+    """
+    wanted = requests(objects)
+    if not wanted:
+        return task
+    references = [canonical(request) for request in wanted]
+    if not isinstance(task, Task):
+        return dataclasses.replace(task, added=tuple(references))
+    pairs = list(zip(wanted, references, strict=True))
+    bare = [text if request.predicate is None else text.rpartition("@")[0] for request, text in pairs]
+    taken = (o.name for o in load_manifest(scene_folder(task.home)).objects)
+    names = [name for name, _ in name_additions(taken, [*task.objects, *bare])][len(task.objects) :]
+    start = [
+        f"({request.predicate[0]} {name} {request.predicate[1]})"
+        for request, name in zip(wanted, names, strict=True)
+        if request.predicate is not None
+    ]
+    return dataclasses.replace(task, objects=(*task.objects, *bare), start=(*task.start, *start))
+
+
+def requests(objects: Objects) -> list[ObjectRequest]:
+    """The objects, read. Raises Ig2mjError: one of them is none."""
+    if not isinstance(objects, str | os.PathLike | Sequence):
+        raise Ig2mjError(f"objects = {objects!r}: a folder or a name of the object library, or a list of them")
+    return [read_request(o) for o in ((objects,) if isinstance(objects, str | os.PathLike) else objects)]
+
+
+def canonical(request: ObjectRequest) -> str:
+    """The text of a request, with a folder's whole path. Raises UnknownNameError: there is no such object."""
+    model = find_model(request.reference)
+    return f"{model.reference}{request.text[len(request.reference) :]}" if model.named else request.text

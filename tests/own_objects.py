@@ -1,0 +1,27 @@
+"""An object of one's own for tests: a cup of one cylinder, 8 cm high, its frame in its middle."""
+
+from __future__ import annotations
+
+import pathlib
+
+CUP = """<robot name="cup"><link name="base_link">
+<inertial><mass value="0.2"/><inertia ixx="2e-4" iyy="2e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/></inertial>
+<visual><geometry><cylinder radius="0.035" length="0.08"/></geometry>
+<material name="clay"><color rgba="0.75 0.3 0.15 1"/></material></visual>
+<collision><geometry><cylinder radius="0.035" length="0.08"/></geometry></collision>
+</link></robot>"""
+
+HALF = 0.04
+"""m: half of its height."""
+
+
+def write_cup(folder: pathlib.Path, name: str = "cup", **options) -> pathlib.Path:
+    """The folder `name` that `ig2mj convert object` writes for it; options of `convert_object`."""
+    from ig2mj_converters.base.options import ConvertOptions
+    from ig2mj_converters.conversion import convert_object
+
+    urdf = folder / f"{name}.urdf"
+    urdf.write_text(CUP)
+    given = {"category": "mug", **options}
+    convert_object(urdf, given.pop("category"), folder / name, options=ConvertOptions(report=False), **given)
+    return folder / name
