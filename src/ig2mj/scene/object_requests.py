@@ -77,11 +77,15 @@ def frame_of(place: Place | Pose) -> Pose:
 
 def _place(text: str, numbers: str, most: int) -> Place | Pose:
     try:
-        values = tuple(float(f"{float(v):.9g}") for v in numbers.split(","))  # as texts of additions have them
+        values = [float(f"{float(v):.9g}") for v in numbers.split(",")]  # as texts of additions have them
     except ValueError:
-        values = ()
+        values = []
     if len(values) not in (4, most) or not all(map(math.isfinite, values)):
         raise Ig2mjError(f"'{text}': the place of an object is {FORMS}")
-    if len(values) == 7 and abs(math.hypot(*values[3:]) - 1) > 1e-3:
+    if len(values) == 4:
+        x, y, z, yaw = values
+        return (x, y, z, yaw)
+    x, y, z, qw, qx, qy, qz = values
+    if abs(math.hypot(qw, qx, qy, qz) - 1) > 1e-3:
         raise Ig2mjError(f"'{text}': the last four numbers are no unit quaternion")
-    return values
+    return (x, y, z, qw, qx, qy, qz)
