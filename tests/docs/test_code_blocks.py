@@ -55,7 +55,18 @@ def commands(text: str) -> list[list[str]]:
     return [words for line in lines if (words := shlex.split(line, comments=True))]
 
 
-LONG = {"demonstrations", "environments", "experts", "sensors", "batches", "sampling", "activities", "index", "README"}
+LONG = {
+    "demonstrations",
+    "environments",
+    "experts",
+    "sensors",
+    "batches",
+    "sampling",
+    "activities",
+    "index",
+    "README",
+    "planning",
+}
 """Pages whose blocks take ten seconds or more together: run by `make test-slow`."""
 
 

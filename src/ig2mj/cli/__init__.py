@@ -66,6 +66,8 @@ COMMANDS: dict[str, str] = {
     "warm-up": "compile ahead of time what a batch of worlds needs, for this or other machines",
     "sample": "sample initial states in which conditions hold, as a pool for batched resets",
     "activity": "list BEHAVIOR's activities, show what each requires, sample its start states",
+    "plan": "print the steps with which a robot reaches a goal, or does an activity",
+    "solve": "plan and carry out the steps to a goal or an activity, and report how often it is reached",
     "list-envs": "list the environments and the robots that can do them",
     "play": "drive a robot in an environment by keyboard and mouse",
     "rollout": "play episodes of an environment and report how they ended",

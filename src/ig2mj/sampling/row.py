@@ -57,6 +57,11 @@ class RowSampler:
         self._truths: dict[tuple[Condition, ...], Truths] = {}
         self.start_from(query.save(), states)
 
+    @property
+    def start(self) -> tuple[Snapshot, ExtendedStates]:
+        """The state that rows begin with."""
+        return self._start, self._initial
+
     def start_from(self, start: Snapshot, states: ExtendedStates) -> None:
         """Lets the next rows begin with another state of the scene."""
         self._start, self._initial = start, jax.tree.map(np.asarray, states)

@@ -1,0 +1,72 @@
+"""`ig2mj plan ACTIVITY|SCENE [GOAL]`: the steps with which a robot reaches a goal, without carrying them out."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Annotated
+
+import tyro
+
+from ig2mj.cli.common.planning import Goal, Objects, What
+
+
+def run(
+    what: What,
+    goal: Goal = None,
+    robot: str = "humanoid",
+    split: str = "held_out",
+    row: int = 0,
+    add: Objects = (),
+    pddl: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FOLDER")] = None,
+    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> int:
+    """Print the steps that reach a goal from a start state.
+
+    The exit status is 0 if there is a plan, or nothing is left to do.
+
+    Args:
+      what: an activity (`ig2mj activity list`), or the name or folder of a home.
+      goal: an expression, such as "(inside apple_0 fridge_0)"; an activity has its own.
+      robot: which robot is to act: it has as many free hands.
+      split: start states of the activity: train or held_out.
+      row: number of the start state.
+      add: with a home: add an object of this category (or category/model) from the object library.
+      pddl: also write domain.pddl and problem.pddl to this folder, for planners that read PDDL.
+      json: print JSON instead of a table.
+    """
+    from ig2mj.cli.common.planning import check_row, domain_of
+    from ig2mj.cli.common.printing import make_table, print_json, stdout_console
+    from ig2mj.planning.pddl import write_pddl
+    from ig2mj.planning.problem import problem_of
+    from ig2mj.planning.symbolic import start_facts
+    from ig2mj.planning.task_planner import TaskPlanner
+
+    check_row(row)
+    problem = problem_of(what, goal, add)
+    domain = domain_of(problem, robot)
+    planner = TaskPlanner(domain, problem.goal)
+    facts = start_facts(domain, problem.scene, problem.pool(split, row + 1), row)
+    plan = planner.plan(facts)
+    if pddl is not None:
+        write_pddl(pddl, problem.name, facts, plan)
+    if json:
+        print_json(
+            {
+                "problem": problem.name,
+                "home": problem.scene.name,
+                "steps": [
+                    {"primitive": s.primitive, "arguments": s.arguments, "for": str(s.serves)} for s in plan.steps
+                ],
+                "missing": [*map(str, plan.missing)],
+                "holds": plan.done,
+            }
+        )
+        return 0
+    if plan.done:
+        print("the goal holds already")
+        return 0
+    rows = [(k + 1, s.primitive, " ".join(s.arguments), str(s.serves)) for k, s in enumerate(plan.steps)]
+    title = f"{problem.name} in {problem.scene.name}: {len(rows)} steps, {len(plan.missing)} conditions are false"
+    console = stdout_console()
+    console.print(make_table(title, (">", "primitive", "arguments", "?for"), rows, console.width))
+    return 0

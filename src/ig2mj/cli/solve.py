@@ -1,0 +1,82 @@
+"""`ig2mj solve ACTIVITY|SCENE [GOAL]`: plans and carries out plans, and reports how often the goal is reached."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Annotated, Literal
+
+import tyro
+
+from ig2mj.cli.common.planning import Goal, Objects, What
+
+
+def run(
+    what: What,
+    goal: Goal = None,
+    robot: str = "humanoid",
+    episodes: int = 1,
+    rung: Literal["symbolic"] = "symbolic",
+    split: str = "held_out",
+    seed: int = 0,
+    seconds: float = float("inf"),
+    add: Objects = (),
+    out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> int:
+    """Reach a goal: plan, carry out the first step, plan again, until the goal holds.
+
+    The exit status is 0 if the goal holds at the end of every episode.
+
+    Args:
+      what: an activity (`ig2mj activity list`), or the name or folder of a home.
+      goal: an expression, such as "(inside apple_0 fridge_0)"; an activity has its own.
+      robot: which robot acts.
+      episodes: number of start states, each solved once.
+      rung: symbolic sets states instead of moving.
+      split: start states of the activity: train or held_out.
+      seed: of what is sampled; the same seed gives the same result.
+      seconds: wall time of an episode after which it ends.
+      add: with a home: add an object of this category (or category/model) from the object library.
+      out: file of results, one line of JSON for each episode; episodes that it holds already are not repeated.
+      json: print one line of JSON at the end instead of a table.
+    """
+    import json as json_module
+    import time
+
+    from ig2mj.cli.common.files import check_output
+    from ig2mj.cli.common.planning import domain_of
+    from ig2mj.cli.common.solving import StepTable, print_figures, print_result
+    from ig2mj.errors import Ig2mjError
+    from ig2mj.planning.problem import problem_of
+    from ig2mj.planning.results import ResultFile
+    from ig2mj.planning.solver import solve, summary
+    from ig2mj.planning.symbolic import symbolic_episodes
+    from ig2mj.planning.task_planner import TaskPlanner
+
+    if episodes < 1:
+        raise Ig2mjError(f"--episodes {episodes}: at least one is needed")
+    if not seconds > 0:
+        raise Ig2mjError(f"--seconds {seconds:g}: must be above 0")
+    if out is not None:
+        check_output(out)
+    began = time.monotonic()
+    problem = problem_of(what, goal, add)
+    domain = domain_of(problem, robot)
+    planner = TaskPlanner(domain, problem.goal)
+    conditions = {"problem": problem.name, "goal": goal, "robot": robot, "rung": rung, "split": split, "seed": seed}
+    results = ResultFile(out, conditions)
+    wanted = [n for n in range(episodes) if n not in results.kept]
+    if wanted:
+        pool = problem.pool(split, episodes)
+        with StepTable(problem.name, silent=json) as table:
+            for number, world in symbolic_episodes(domain, problem.scene, pool, wanted, seed):
+                table.begin(number, episodes)
+                results.add(number, solve(planner, world, seconds=seconds, watch=table.watch)[0])
+    found = [results.kept[n] for n in sorted(results.kept) if n < episodes]
+    figures = summary(found, time.monotonic() - began)
+    if json:
+        print(json_module.dumps(figures))
+        return 0 if figures["success_rate"] == 1.0 else 1
+    print_result(f"{problem.name} in {problem.scene.name}, episode {len(found)} of {episodes}", found[-1])
+    print_figures(figures)
+    return 0 if figures["success_rate"] == 1.0 else 1

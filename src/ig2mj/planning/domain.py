@@ -1,0 +1,217 @@
+"""`Domain`: what of a scene matters to a task planner: which objects open, clean, wet, cut, heat, cool and bear."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ig2mj.predicates.literals import object_index
+from ig2mj.predicates.logic import Atom
+from ig2mj.predicates.registry import find
+from ig2mj.sampling.conditions import Condition
+from ig2mj.sampling.rules import PLACEMENTS
+from ig2mj.states.model import StateModel
+
+SUPPORT_HEIGHT, SUPPORT_EDGE = (0.25, 1.3), 0.3
+"""m: heights of the upper sides, and least horizontal edge, of furniture on which an object can be put out of the
+way."""
+
+COLD = 0.0
+"""Celsius below which a source freezes."""
+
+
+@dataclasses.dataclass(frozen=True)
+class HeatSource:
+    """A source that heats or cools (`StateParameters.heat_*`), by its object's name."""
+
+    name: str
+    temperature: float
+    needs_switch: bool
+    needs_closed: bool
+    acts_inside: bool
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Domain:
+    """Constants of one scene and robot.
+
+    Attributes:
+      model: of the scene's states. hands: number of objects that the robot can hold at a time.
+    """
+
+    model: StateModel
+    hands: int = 2
+
+    def index(self, name: str) -> int:
+        """Position of an object. Raises UnknownNameError."""
+        return object_index(self.model, name)
+
+    def has(self, name: str, ability: str) -> bool:
+        """Whether an object has an ability."""
+        return ability in self.model.parameters.abilities[self.index(name)]
+
+    def fixed(self, name: str) -> bool:
+        """Whether an object is a part of the house."""
+        return bool(self.model.tables.object_fixed[self.index(name)])
+
+    def opens(self, name: str) -> bool:
+        """Whether an object has joints that count for `open`."""
+        return name in self._openable
+
+    def halves(self, name: str) -> tuple[str, ...]:
+        """Names of what an object is cut into."""
+        names = self.model.tables.object_names
+        return tuple(names[h] for h in self.model.parameters.halves_of(self.index(name)))
+
+    @functools.cached_property
+    def _openable(self) -> frozenset[str]:
+        names = self.model.tables.object_names
+        return frozenset(n for j in np.unique(self.model.tables.openable_object) if self.has(n := names[j], "openable"))
+
+    @functools.cached_property
+    def openable(self) -> tuple[str, ...]:
+        """All objects that open, in the scene's order."""
+        return tuple(n for n in self.model.tables.object_names if n in self._openable)
+
+    def _loose(self, ability: str) -> tuple[str, ...]:
+        tables, found = self.model.tables, self.model.parameters.has(ability)
+        usable = found & ~tables.object_fixed & ~tables.object_parked
+        return tuple(tables.object_names[o] for o in np.flatnonzero(usable))
+
+    @functools.cached_property
+    def tools(self) -> tuple[str, ...]:
+        """Cleaning tools that can be carried."""
+        return self._loose("cleaningTool")
+
+    @functools.cached_property
+    def knives(self) -> tuple[str, ...]:
+        """Objects that cut."""
+        return self._loose("slicer")
+
+    @functools.cached_property
+    def taps(self) -> tuple[str, ...]:
+        """Objects from which water comes."""
+        names = self.model.tables.object_names
+        return tuple(dict.fromkeys(names[o] for o in self.model.parameters.water_object))
+
+    @functools.cached_property
+    def sources(self) -> tuple[HeatSource, ...]:
+        """Sources of heat and cold."""
+        p, names = self.model.parameters, self.model.tables.object_names
+        return tuple(
+            HeatSource(
+                names[o],
+                float(p.heat_temperature[s]),
+                bool(p.heat_requires_toggled_on[s]),
+                bool(p.heat_requires_closed[s]),
+                bool(p.heat_requires_inside[s]),
+            )
+            for s, o in enumerate(p.heat_object)
+            if p.heat_requires_inside[s] or p.heat_link[s] >= 0
+        )
+
+    def heaters(self, name: str) -> tuple[HeatSource, ...]:
+        """Sources hot enough to cook an object, those that need no door first."""
+        limit = float(self.model.parameters.cook_temperature[self.index(name)])
+        hot = [s for s in self.sources if s.temperature >= limit]
+        return tuple(sorted(hot, key=lambda s: s.acts_inside))
+
+    def coolers(self, name: str) -> tuple[HeatSource, ...]:
+        """Sources cold enough to freeze an object."""
+        limit = float(self.model.parameters.freeze_temperature[self.index(name)])
+        return tuple(s for s in self.sources if s.temperature <= min(limit, COLD))
+
+    def impossible(self, condition: Condition) -> str:
+        """Why no primitive can make a condition true, in words; "" where one can.
+
+        Raises:
+          UnknownNameError, ArityError: it names something that the scene lacks.
+        """
+        predicate, value = find(condition.predicate), condition.value
+        name = condition.arguments[0]
+        if condition.predicate not in (*PLACEMENTS, *_CHANGES):
+            return f"no primitive makes '{predicate.name}' true or false"
+        if condition.predicate in PLACEMENTS:
+            self.index(name)
+            if self._mover(condition) is None:
+                return f"'{name}' is fixed"
+            if value and len(condition.arguments) > 1 and condition.arguments[0] == condition.arguments[1]:
+                return f"'{name}' cannot be placed relative to itself"
+            return ""
+        if predicate.ability is not None and not self.has(name, predicate.ability):
+            return f"'{name}' is not {predicate.ability}" if value else ""
+        return self._unchangeable(condition.predicate, name, value)
+
+    def _mover(self, condition: Condition) -> str | None:
+        """The object to be moved so that a placement becomes true: the first argument, or where that is fixed and the
+        relation holds both ways, the second."""
+        name = condition.arguments[0]
+        if not self.fixed(name):
+            return name
+        if condition.predicate in SYMMETRIC and not self.fixed(condition.arguments[1]):
+            return condition.arguments[1]
+        return None
+
+    def mover(self, condition: Condition) -> str:
+        """The object that a placement moves."""
+        found = self._mover(condition)
+        assert found is not None, condition
+        return found
+
+    def _unchangeable(self, predicate: str, name: str, value: bool) -> str:
+        if predicate == "open":
+            return "" if self.opens(name) else f"'{name}' has no joints that open"
+        if predicate == "toggled_on":
+            return ""
+        if value != _CHANGES[predicate]:
+            return f"no primitive makes '{name}' {'' if value else 'not '}{predicate}"
+        if predicate in ("dusty", "stained"):
+            tools = [t for t in self.tools if t != name]
+            if not tools:
+                return "the scene has no cleaning tool that can be carried"
+            if predicate == "stained" and not (self.taps and any(self.has(t, "soakable") for t in tools)):
+                return "the scene has no water, or no cleaning tool that can be soaked"
+            return ""
+        if predicate == "soaked":
+            if not self.taps:
+                return "the scene has no water"
+            return f"'{name}' is fixed" if self.fixed(name) else ""
+        if predicate == "sliced":
+            return "" if self.knives else "the scene has no knife"
+        if predicate == "cooked":
+            return "" if self.heaters(name) else f"nothing in the scene is hot enough for '{name}'"
+        return "" if self.coolers(name) else f"nothing in the scene is cold enough for '{name}'"
+
+    @functools.cached_property
+    def supports(self) -> tuple[str, ...]:
+        """Fixed furniture with a large upper side at the height of a table, largest first."""
+        tables = self.model.tables
+        size, top = tables.object_bbox, tables.object_bbox[:, 2]
+        good = tables.object_fixed & ~tables.object_is_floor
+        good &= (top >= SUPPORT_HEIGHT[0]) & (top <= SUPPORT_HEIGHT[1]) & (size[:, :2].min(1) >= SUPPORT_EDGE)
+        order = np.flatnonzero(good)[np.argsort(-(size[good, 0] * size[good, 1]), kind="stable")]
+        names = [tables.object_names[o] for o in order]
+        return tuple(n for n in names if n not in self._openable) or tuple(names)
+
+
+_CHANGES = {
+    "open": True,
+    "toggled_on": True,
+    "soaked": True,
+    "dusty": False,
+    "stained": False,
+    "sliced": True,
+    "cooked": True,
+    "frozen": True,
+}
+"""Predicates of one object that primitives change, and to what (open and toggled_on both ways)."""
+
+SYMMETRIC = ("next_to", "in_contact_with")
+"""Relations that hold both ways, so that either object may be moved."""
+
+
+def condition_of(atom: Atom, value: bool = True) -> Condition:
+    """An atom, or its negation, as a condition."""
+    return Condition(find(atom.predicate).name, atom.arguments, value)

@@ -1,0 +1,101 @@
+"""`Facts`: what holds in one world of a batch, asked atom by atom; each is evaluated once.
+
+Axes: W worlds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import jax
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.view import PhysicsView
+from ig2mj.planning.domain import Domain
+from ig2mj.predicates.host_queries import HostQueries
+from ig2mj.predicates.literals import Literals
+from ig2mj.predicates.logic import Atom
+from ig2mj.predicates.registry import find
+from ig2mj.states.world import ExtendedStates
+
+
+class Facts:
+    """One world as it was when this was made.
+
+    Attributes:
+      domain: constants. view, states: of this world, with a world axis of length 1.
+      held: names of what the robot holds, in the order of its hands' numbers; hands that hold nothing are left out.
+    """
+
+    def __init__(
+        self,
+        domain: Domain,
+        states: ExtendedStates,
+        view: PhysicsView,
+        world: int = 0,
+        held: Sequence[str] = (),
+    ):
+        """`states`, `view`: of all worlds; `world`: which one."""
+        if len(np.asarray(states.sliced)) > 1:
+            states, view = jax.tree.map(lambda leaf: np.asarray(leaf)[world : world + 1], (states, view))
+        self.domain, self.states, self.view = domain, states, view
+        self.held = tuple(held)
+        self._known: dict[Atom, bool] = {}
+        self._queries = HostQueries.of(domain.model)
+
+    def truth(self, atoms: Iterable[Atom]) -> dict[Atom, bool]:
+        """Truth of atoms, evaluated together; of an object without the ability, false."""
+        atoms = list(dict.fromkeys(atoms))
+        self._known |= {a: False for a in atoms if not self._able(a)}
+        if new := [a for a in atoms if a not in self._known]:
+            literals = Literals.build(self.domain.model, new)
+            facts = self._queries.facts(literals, self.states, self.view)
+            values = np.asarray(literals.combine(facts, self.states.sliced))[0]
+            self._known |= dict(zip(new, values.tolist(), strict=True))
+        return {a: self._known[a] for a in atoms}
+
+    def holds(self, predicate: str, *arguments: str) -> bool:
+        """Truth of one predicate."""
+        atom = Atom(predicate, arguments)
+        return self.truth([atom])[atom]
+
+    def _able(self, atom: Atom) -> bool:
+        ability = find(atom.predicate).ability
+        return ability is None or self.domain.has(atom.arguments[0], ability)
+
+    def place(self, name: str) -> Float[np.ndarray, "3"]:
+        """Centre of mass of an object, m, world frame."""
+        return np.asarray(self.view.object_com)[0, self.domain.index(name)]
+
+    def box(self, name: str) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """World box of an object: low and high corner, m."""
+        index = self.domain.index(name)
+        return np.asarray(self.view.aabb_low)[0, index], np.asarray(self.view.aabb_high)[0, index]
+
+    def sliced(self, name: str) -> bool:
+        """Whether an object has been cut, so that its halves stand for it."""
+        return bool(np.asarray(self.states.sliced)[0, self.domain.index(name)]) and bool(self.domain.halves(name))
+
+    def containers(self, name: str) -> tuple[str, ...]:
+        """Objects with doors, drawers or lids that the object is inside of."""
+        middle = self.place(name)
+        near = []
+        for other in self.domain.openable:
+            low, high = self.box(other)
+            if other != name and (low <= middle).all() and (middle <= high).all():
+                near.append(Atom("inside", (name, other)))
+        truth = self.truth(near)
+        return tuple(a.arguments[1] for a in near if truth[a])
+
+    def room(self, name: str) -> str:
+        """Room instance above whose floor an object is; the home's floor object where the map has none there."""
+        tables = self.domain.model.tables
+        if len(tables.room_names):
+            x, y = self.place(name)[:2]
+            size = tables.room_map.shape[0]
+            row, column = (int(v / tables.room_resolution + size / 2) for v in (y, x))
+            if 0 <= row < size and 0 <= column < size and (found := int(tables.room_map[row, column])) > 0:
+                return tables.room_names[found - 1]
+        floors = [n for n, is_floor in zip(tables.object_names, tables.object_is_floor, strict=True) if is_floor]
+        return floors[0] if floors else ""

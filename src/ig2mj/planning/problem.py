@@ -1,0 +1,104 @@
+"""`Problem`: what is to be solved: a household, a goal in it, and start states.
+
+problem_of("activity NAME")                                   the activity's goal and start states
+problem_of("small_home", "(inside apple_0 fridge_0)")         a goal of one's own, from the scene's start
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from ig2mj.engine.snapshot import Snapshot
+from ig2mj.errors import UnknownNameError
+from ig2mj.planning.steps import PlanningError
+from ig2mj.predicates.compile import CompiledExpression, compile_expression
+from ig2mj.predicates.host_queries import HostQueries
+from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.states.model import StateModel
+from ig2mj.tasks.bddl.definitions import activity_names
+from ig2mj.tasks.bddl.goal import conditions
+from ig2mj.tasks.bddl.start import load_bound
+from ig2mj.tasks.bddl.task import PREFIX, activity_pool, bddl_task
+from ig2mj.tasks.pools import pool_of
+from ig2mj.tasks.registry import TASKS, load_task
+from ig2mj.tasks.task import Task
+from ig2mj.worlds.pool import Pool
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Problem:
+    """See the module's text.
+
+    Attributes:
+      name: of the activity, or of the scene. scene: without robots. model: of its states. goal: compiled for the scene.
+      task: of the activity; None: a goal of one's own.
+    """
+
+    name: str
+    scene: Scene
+    model: StateModel
+    goal: CompiledExpression
+    task: Any = None
+
+    def pool(self, split: str = "held_out", count: int = 1) -> Pool | None:
+        """The activity's first start states, sampled where they are not kept yet; None: the scene's own start.
+
+        Raises:
+          UnknownNameError: no such split. EngineError: none can be sampled.
+        """
+        if self.task is None:
+            return None
+        if isinstance(self.task, Task):
+            return pool_of(self.task, split, count)
+        return activity_pool(self.task, split, count)
+
+
+def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) -> Problem:
+    """The problem of an activity's name, or of a scene and a goal.
+
+    Args:
+      what: an activity of BEHAVIOR or of the paper, a home that ships, or a folder of a scene.
+      goal: expression; None: that of the activity. objects: what is added to the scene from the object library.
+
+    Raises:
+      UnknownNameError: no such activity, scene, object or predicate. PlanningError: a scene without a goal.
+      ExpressionError: the goal is not an expression.
+    """
+    short = what.removeprefix(PREFIX)
+    if short in activity_names():
+        task = bddl_task(short)
+        scene = load_bound(task.binding)
+        model = StateModel.of_manifest(scene.tables, scene.manifest)
+        compiled = conditions(task.binding).compile_goal(model) if goal is None else _compiled(model, goal)
+        return Problem(short, scene, model, compiled, task)
+    if short in TASKS:
+        task = load_task(short)
+        if not isinstance(task, Task):
+            raise PlanningError(f"{short} has no goal expression to plan for (MotionPlanner.plan_base plans ways)")
+        scene = load_scene(task.home, objects=task.objects)
+        model = StateModel.of_manifest(scene.tables, scene.manifest)
+        return Problem(short, scene, model, _compiled(model, goal or task.goal), task)
+    if goal is None:
+        try:
+            load_scene(what)
+        except Exception:
+            raise UnknownNameError("activity", what, [*activity_names(), *TASKS]) from None
+        raise PlanningError(f'{what} is a scene: give a goal, such as "(inside apple_0 fridge_0)"')
+    scene = load_scene(what, objects=objects)
+    model = StateModel.of_manifest(scene.tables, scene.manifest)
+    return Problem(scene.name, scene, model, _compiled(model, goal))
+
+
+def _compiled(model: StateModel, goal: str) -> CompiledExpression:
+    return compile_expression(model, goal, questions=HostQueries.of(model))
+
+
+def start_of(pool: Pool, number: int) -> tuple[Snapshot, Any]:
+    """Physics without, and states with a world axis of length 1, of a row of a pool."""
+    one = pool.rows(np.array([number]))
+    return jax.tree.map(lambda a: np.asarray(a[0]), one.physics), one.states

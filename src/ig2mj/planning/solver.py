@@ -1,0 +1,176 @@
+"""`solve`: carries out plans in worlds until the goal holds, with a new plan after every step."""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import math
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ig2mj.planning.readings import quality
+from ig2mj.planning.rung import Rung
+from ig2mj.planning.steps import Outcome, PlanningError, Step
+from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
+from ig2mj.predicates.explain import value_of
+from ig2mj.predicates.logic import Atom
+from ig2mj.sampling.conditions import Condition
+
+MOST_STEPS, EXTRA_STEPS = 4, 12
+"""An episode ends after so many times the steps of its first plan, and so many more."""
+
+GIVE_UP = 6
+"""Failures of one condition after which an episode ends."""
+
+
+@dataclasses.dataclass(frozen=True)
+class StepRecord:
+    """A step that was carried out, and the wall time in seconds that it took with its planning."""
+
+    step: Step
+    outcome: Outcome
+    seconds: float
+
+
+@dataclasses.dataclass(frozen=True)
+class EpisodeResult:
+    """What became of one episode.
+
+    Attributes:
+      success: the goal holds at the end. q: partial credit (`ig2mj.planning.readings.quality`).
+      steps: in order. replans: plans that are not the rest of the plan before. planned: steps of the first plan.
+      seconds: wall time. time: simulated seconds. ended: why it ended without success, in words, else "".
+    """
+
+    success: bool
+    q: float
+    steps: tuple[StepRecord, ...]
+    replans: int
+    planned: int
+    seconds: float
+    time: float
+    ended: str = ""
+
+
+Watch = Callable[[int, TaskPlan, Sequence[StepRecord]], None]
+"""Told of each new plan: number of the world, the plan, the steps before it."""
+
+
+def unwatched(world: int, plan: TaskPlan, records: Sequence[StepRecord]) -> None:
+    """A `Watch` that does nothing."""
+
+
+@dataclasses.dataclass
+class _Episode:
+    start: dict[Atom, bool]
+    began: float
+    plan: TaskPlan | None = None
+    planned: int = 0
+    replans: int = 0
+    records: list[StepRecord] = dataclasses.field(default_factory=list)
+    failed: collections.Counter[Condition] = dataclasses.field(default_factory=collections.Counter)
+    since: float = 0.0
+    result: EpisodeResult | None = None
+
+
+def solve(
+    planner: TaskPlanner, rung: Rung, *, seconds: float = math.inf, watch: Watch = unwatched
+) -> list[EpisodeResult]:
+    """Solves one episode in each world of a rung.
+
+    Args:
+      seconds: wall time after which no further step is begun.
+
+    Raises:
+      PlanningError: the goal cannot become true in some world's start.
+    """
+    end = time.monotonic() + seconds
+    episodes = []
+    for world in range(rung.num_worlds):
+        episode = _Episode(rung.facts(world).truth(planner.goal.atoms), time.monotonic())
+        episodes.append(episode)
+        _next(planner, rung, world, episode, end, watch)
+    while any(e.result is None for e in episodes):
+        for world, outcome in rung.advance().items():
+            episode = episodes[world]
+            assert episode.plan is not None
+            step = episode.plan.steps[0]
+            episode.records.append(StepRecord(step, outcome, time.monotonic() - episode.since))
+            if not outcome.done and step.serves is not None:
+                episode.failed[step.serves] += 1
+            _next(planner, rung, world, episode, end, watch)
+    return [e.result for e in episodes if e.result is not None]
+
+
+def _next(planner: TaskPlanner, rung: Rung, world: int, episode: _Episode, end: float, watch: Watch) -> None:
+    """Plans again, and begins the next step or ends the episode."""
+    episode.since = time.monotonic()
+    facts = rung.facts(world)
+    ended = ""
+    try:
+        plan = planner.plan(facts, episode.failed)
+    except PlanningError as e:
+        if episode.plan is None:
+            raise
+        plan, ended = episode.plan, str(e)
+    else:
+        before = None if episode.plan is None else episode.plan.steps[1:]
+        episode.replans += before is not None and [*map(str, plan.steps)] != [*map(str, before)]
+        episode.planned = episode.planned or len(plan.steps)
+        episode.plan = plan
+        watch(world, plan, episode.records)
+        if plan.steps:
+            ended = _limit(episode, end)
+            if not ended:
+                rung.begin(world, plan.steps[0])
+                return
+        elif not plan.done:
+            ended = f"no step makes {plan.missing[0]} true"
+    truth = facts.truth(planner.goal.atoms)
+    success = value_of(planner.goal.ground, truth)
+    episode.result = EpisodeResult(
+        success=success,
+        q=1.0 if success else quality(planner.goal.ground, episode.start, truth),
+        steps=tuple(episode.records),
+        replans=episode.replans,
+        planned=episode.planned,
+        seconds=time.monotonic() - episode.began,
+        time=float(sum(r.outcome.time for r in episode.records)),
+        ended="" if success else ended,
+    )
+
+
+def _limit(episode: _Episode, end: float) -> str:
+    """The limit that the episode has reached, in words."""
+    if time.monotonic() >= end:
+        return "the time limit passed"
+    if len(episode.records) >= MOST_STEPS * episode.planned + EXTRA_STEPS:
+        return f"{len(episode.records)} steps were not enough"
+    if episode.failed and episode.failed.most_common(1)[0][1] >= GIVE_UP:
+        condition, count = episode.failed.most_common(1)[0]
+        return f"{condition} failed {count} times"
+    return ""
+
+
+def summary(results: Sequence[EpisodeResult], seconds: float) -> dict:
+    """The figures of a run, as `ig2mj solve --json` prints them: `success_rate`, `q`, `episodes`, `replans` (mean per
+    episode), `seconds` (`seconds`: wall time of all), `failures` ({primitive: {reason: count}})."""
+    failures: dict[str, collections.Counter[str]] = {}
+    for result in results:
+        for record in result.steps:
+            if not record.outcome.done:
+                failures.setdefault(record.step.primitive, collections.Counter())[record.outcome.reason] += 1
+
+    def mean(values: list[float]) -> float | None:
+        return float(np.mean(values)) if values else None
+
+    return {
+        "success_rate": mean([float(r.success) for r in results]),
+        "q": mean([r.q for r in results]),
+        "episodes": len(results),
+        "replans": mean([float(r.replans) for r in results]),
+        "seconds": round(seconds, 3),
+        "failures": {name: dict(count) for name, count in failures.items()},
+    }

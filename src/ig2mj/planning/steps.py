@@ -1,0 +1,170 @@
+"""`Step` and `Outcome`: what is asked of a primitive, and how it ended; `PRIMITIVES` lists all primitives.
+
+A primitive is named by a verb. Its arguments are names of objects or rooms of the scene, the object that it acts on
+first. It ends by a predicate, not by an error of position.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from ig2mj.errors import Ig2mjError, UnknownNameError
+from ig2mj.sampling.conditions import Condition
+
+REASONS = {
+    "no_base": "no free floor from which the robot reaches it",
+    "no_grasp": "no hand can take hold of it: out of reach, shut in, too heavy, or the hands are full",
+    "no_path": "no way there without a collision",
+    "slipped": "the hand lost what it held",
+    "not_true_after": "the motion ended and the condition is false",
+    "timeout": "the time limit passed",
+}
+"""Why a primitive fails."""
+
+
+class PlanningError(Ig2mjError):
+    """A goal that cannot be planned for, or a request that no primitive of the robot can carry out."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Primitive:
+    """One primitive.
+
+    Attributes:
+      name: verb. arguments: what each argument is. before: what must hold first. until: what ends it with success.
+      adds: conditions that hold afterwards, with `?0`, `?1` for the arguments.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    before: str
+    until: str
+    adds: tuple[tuple[str, ...], ...] = ()
+
+
+_PRIMITIVES = (
+    Primitive("navigate_to", ("object",), "a way over free floor", "the robot stands where its hands reach the object"),
+    Primitive("grasp", ("object",), "a free hand; the object is not shut in", "a hand holds the object"),
+    Primitive(
+        "place_on_top", ("object", "support"), "the object is in a hand", "on_top(object, support)",
+        (("on_top", "?0", "?1"),),
+    ),
+    Primitive(
+        "place_inside", ("object", "container"), "the object is in a hand; the container is open",
+        "inside(object, container)", (("inside", "?0", "?1"),),
+    ),
+    Primitive(
+        "place_next_to", ("object", "other"), "the object is in a hand", "next_to(object, other)",
+        (("next_to", "?0", "?1"),),
+    ),
+    Primitive(
+        "place_under", ("object", "other"), "the object is in a hand", "under(object, other)",
+        (("under", "?0", "?1"),),
+    ),
+    Primitive(
+        "place_on_floor", ("object", "room"), "the object is in a hand", "on_floor(object, room)",
+        (("on_floor", "?0", "?1"),),
+    ),
+    Primitive("release", ("object",), "the object is in a hand", "no hand holds the object"),
+    Primitive("open", ("object",), "a free hand", "open(object)", (("open", "?0"),)),
+    Primitive("close", ("object",), "a free hand", "not open(object)", (("not", "open", "?0"),)),
+    Primitive("toggle_on", ("object",), "a free finger", "toggled_on(object)", (("toggled_on", "?0"),)),
+    Primitive("toggle_off", ("object",), "a free finger", "not toggled_on(object)", (("not", "toggled_on", "?0"),)),
+    Primitive(
+        "wipe", ("object", "tool"), "the cleaning tool is in a hand", "not dusty(object)", (("not", "dusty", "?0"),)
+    ),
+    Primitive(
+        "soak", ("object", "source"), "the object is in a hand; the water runs", "soaked(object)", (("soaked", "?0"),)
+    ),
+    Primitive(
+        "scrub", ("object", "tool"), "the soaked cleaning tool is in a hand", "not stained(object)",
+        (("not", "stained", "?0"),),
+    ),
+    Primitive("slice", ("object", "knife"), "the knife is in a hand", "sliced(object)", (("sliced", "?0"),)),
+    Primitive(
+        "cook", ("object", "source"), "the source is on; the object is in a hand, or inside a source that acts inside",
+        "cooked(object), never burnt(object)", (("cooked", "?0"),),
+    ),
+    Primitive(
+        "freeze", ("object", "source"), "the object is inside the source, which is closed", "frozen(object)",
+        (("frozen", "?0"),),
+    ),
+    Primitive(
+        "push", ("object", "other"), "a free hand", "in_contact_with(object, other)",
+        (("in_contact_with", "?0", "?1"),),
+    ),
+)  # fmt: skip
+
+PRIMITIVES: dict[str, Primitive] = {p.name: p for p in _PRIMITIVES}
+
+
+@dataclasses.dataclass(frozen=True)
+class Step:
+    """A request to a primitive.
+
+    Attributes:
+      primitive: name of one of `PRIMITIVES`. arguments: names of objects and rooms.
+      also: further conditions on the object that is placed, which must hold afterwards, too.
+      serves: the condition of the goal that it is for; None: it was asked for by itself.
+    """
+
+    primitive: str
+    arguments: tuple[str, ...]
+    also: tuple[Condition, ...] = ()
+    serves: Condition | None = None
+
+    @property
+    def object(self) -> str:
+        """What it acts on."""
+        return self.arguments[0]
+
+    @property
+    def adds(self) -> tuple[Condition, ...]:
+        """Conditions that hold when it is done, those of `also` among them."""
+        found = []
+        for template in PRIMITIVES[self.primitive].adds:
+            value = template[0] != "not"
+            name, *places = template if value else template[1:]
+            found.append(Condition(name, tuple(self.arguments[int(p[1:])] for p in places), value))
+        return (*found, *(c for c in self.also if c not in found))
+
+    def __str__(self) -> str:
+        return " ".join((self.primitive, *self.arguments))
+
+
+def make_step(primitive: str, arguments: Sequence[str]) -> Step:
+    """A step, checked.
+
+    Raises:
+      UnknownNameError: no such primitive. PlanningError: too many or too few arguments.
+    """
+    if primitive not in PRIMITIVES:
+        raise UnknownNameError("primitive", primitive, PRIMITIVES)
+    wanted = PRIMITIVES[primitive].arguments
+    if len(arguments) != len(wanted):
+        raise PlanningError(
+            f"primitive '{primitive}' takes {' and '.join(wanted)}, not {len(arguments)} "
+            f"argument{'s' * (len(arguments) != 1)}"
+        )
+    return Step(primitive, tuple(arguments))
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """How a primitive ended.
+
+    Attributes:
+      reason: a key of `REASONS`, or "" for success. detail: more about a failure, in words.
+      time: simulated seconds that it took. attempts: tries within the primitive.
+    """
+
+    reason: str = ""
+    detail: str = ""
+    time: float = 0.0
+    attempts: int = 1
+
+    @property
+    def done(self) -> bool:
+        """It succeeded."""
+        return not self.reason

@@ -1,0 +1,176 @@
+"""`SymbolicRung`: primitives as changes of states, by the samplers and setters of `ig2mj.sampling`.
+
+It tests task plans and goals without motion: preconditions are checked, an object is placed where the sampler finds
+room and everything comes to rest, and hands are names of what they hold. A held object stays where it is until it is
+placed.
+"""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+import jax
+import numpy as np
+
+from ig2mj.engine.snapshot import Snapshot
+from ig2mj.errors import AbilityError, StateError
+from ig2mj.planning.domain import Domain
+from ig2mj.planning.facts import Facts
+from ig2mj.planning.problem import start_of
+from ig2mj.planning.steps import Outcome, PlanningError, Step
+from ig2mj.sampling.many import make_sampler
+from ig2mj.sampling.placement import Budget, Rejections
+from ig2mj.sampling.row import RowSampler
+from ig2mj.scene.scene import Scene
+from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.pool import Pool
+
+WORK = 200
+"""Units of a placement (`ig2mj.sampling.placement.Budget`)."""
+
+
+@dataclasses.dataclass
+class _SymbolicWorld:
+    physics: Snapshot
+    states: ExtendedStates
+    held: list[str]
+    step: Step | None = None
+    count: int = 0
+
+
+class SymbolicRung:
+    """See the module's text and `ig2mj.planning.rung.Rung`."""
+
+    name = "symbolic"
+
+    def __init__(
+        self,
+        domain: Domain,
+        sampler: RowSampler,
+        starts: Sequence[tuple[Snapshot, ExtendedStates]],
+        seed: int = 0,
+        first: int = 0,
+    ):
+        """
+        Args:
+          sampler: of the scene; its world is used for all worlds in turn.
+          starts: physics without, states with a world axis of 1, of each world.
+          seed, first: of random streams: a stream belongs to (seed, first + world, number of the step).
+        """
+        self._domain, self._sampler, self._seed, self._first = domain, sampler, seed, first
+        self._worlds = [_SymbolicWorld(p, jax.tree.map(np.asarray, s), []) for p, s in starts]
+
+    @property
+    def num_worlds(self) -> int:
+        return len(self._worlds)
+
+    def facts(self, world: int) -> Facts:
+        own = self._worlds[world]
+        self._sampler.query.load(own.physics)
+        return Facts(self._domain, own.states, self._sampler.query.view, held=own.held)
+
+    def begin(self, world: int, step: Step) -> None:
+        self._worlds[world].step = step
+
+    def advance(self) -> dict[int, Outcome]:
+        return {w: self._carry_out(w) for w, own in enumerate(self._worlds) if own.step is not None}
+
+    def _carry_out(self, world: int) -> Outcome:
+        own = self._worlds[world]
+        step, own.step = own.step, None
+        assert step is not None
+        own.count += 1
+        if lacking := self._lacking(step, self.facts(world), own.held):
+            return Outcome("no_grasp", lacking)
+        if step.primitive == "grasp":
+            own.held.append(step.object)
+        elif step.primitive == "release":
+            own.held.remove(step.object)
+        elif step.adds:
+            if failure := self._make_true(world, own, step):
+                return failure
+            if step.primitive.startswith("place_"):
+                own.held.remove(step.object)
+        return Outcome()
+
+    def _lacking(self, step: Step, facts: Facts, held: Sequence[str]) -> str:
+        """What of the primitive's preconditions is false, in words."""
+        name, kind = step.object, step.primitive
+        second = step.arguments[1] if len(step.arguments) > 1 else ""
+        shut = [c for c in facts.containers(name) if name not in held and not facts.holds("open", c)]
+        if kind == "grasp":
+            if name in held:
+                return f"a hand holds {name} already"
+            if len(held) >= self._domain.hands:
+                return f"the hands are full: {', '.join(held)}"
+            if self._domain.fixed(name):
+                return f"{name} is fixed"
+        if kind in ("open", "close", "push") and len(held) >= self._domain.hands:
+            return f"the hands are full: {', '.join(held)}"
+        if (kind.startswith("place_") or kind in ("release", "soak")) and name not in held:
+            return f"no hand holds {name}"
+        if kind in ("wipe", "scrub", "slice") and second not in held:
+            return f"no hand holds {second}"
+        if kind == "scrub" and not facts.holds("soaked", second):
+            return f"{second} is not soaked"
+        if kind == "soak" and self._domain.has(second, "toggleable") and not facts.holds("toggled_on", second):
+            return f"{second} is not toggled on"
+        if kind == "place_inside" and self._domain.opens(second) and not facts.holds("open", second):
+            return f"{second} is not open"
+        if kind in ("cook", "freeze") and (why := self._not_acting(name, second, facts, held)):
+            return why
+        if shut and kind not in ("release",):
+            return f"{name} is shut in {', '.join(shut)}"
+        return ""
+
+    def _not_acting(self, name: str, source: str, facts: Facts, held: Sequence[str]) -> str:
+        """Why a source of heat or cold does not act on an object."""
+        rules = next(s for s in self._domain.sources if s.name == source)
+        if rules.needs_switch and not facts.holds("toggled_on", source):
+            return f"{source} is not toggled on"
+        if rules.needs_closed and self._domain.opens(source) and facts.holds("open", source):
+            return f"{source} is open"
+        if rules.acts_inside:
+            return "" if facts.holds("inside", name, source) else f"{name} is not inside {source}"
+        return "" if name in held else f"no hand holds {name}"
+
+    def _make_true(self, world: int, own: _SymbolicWorld, step: Step) -> Outcome | None:
+        """The failure, or None: the world is changed so that what the step adds holds."""
+        rng = np.random.default_rng([self._seed, self._first + world, own.count])
+        rejected: Rejections = collections.Counter()
+        self._sampler.start_from(own.physics, own.states)
+        try:
+            row = self._sampler.sample(list(step.adds), rng, Budget(WORK), rejected)
+        except (StateError, AbilityError) as e:
+            return Outcome("not_true_after", str(e))
+        if row is None:
+            often = ", ".join(f"{reason} ({count})" for reason, count in rejected.most_common(2))
+            return Outcome("not_true_after", often or "the sampler found nothing")
+        own.physics, own.states = row.physics, row.states
+        return None
+
+
+def symbolic_episodes(
+    domain: Domain, scene: Scene, pool: Pool | None, numbers: Sequence[int], seed: int = 0
+) -> Iterator[tuple[int, SymbolicRung]]:
+    """Rungs of one world each, one after another, with the number of each episode.
+
+    Args:
+      scene: without robots. pool: start states; an episode without a row of its own is left out. None: the scene at
+        rest. numbers: of the episodes. seed: see `SymbolicRung`.
+    """
+    sampler = make_sampler(scene)
+    own = sampler.start
+    for number in numbers:
+        if pool is None or number < pool.size:
+            yield number, SymbolicRung(domain, sampler, [own if pool is None else start_of(pool, number)], seed, number)
+
+
+def start_facts(domain: Domain, scene: Scene, pool: Pool | None, row: int) -> Facts:
+    """What holds in a start state. Raises PlanningError: there are fewer."""
+    if pool is not None and row >= pool.size:
+        raise PlanningError(f"start state {row} was asked for, and only {pool.size} could be sampled")
+    (_, rung), *_ = symbolic_episodes(domain, scene, pool, [row])
+    return rung.facts(0)

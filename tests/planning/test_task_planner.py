@@ -1,0 +1,216 @@
+"""Plans of the task planner, in the tiny home of the tests, carried out as PDDL and on the symbolic rung."""
+
+import collections
+import json
+
+import numpy as np
+import pytest
+from planning_domain import World
+
+from ig2mj.cli import call
+from ig2mj.errors import UnknownNameError
+from ig2mj.planning import Domain, PlanningError, SymbolicRung, TaskPlanner, make_step, solve, summary
+from ig2mj.planning.pddl import domain_pddl, problem_pddl
+from ig2mj.planning.steps import PRIMITIVES
+from ig2mj.predicates.compile import compile_expression
+from ig2mj.predicates.host_queries import HostQueries
+from ig2mj.sampling.conditions import read_conditions
+from ig2mj.sampling.many import make_sampler
+from ig2mj.sampling.placement import Budget
+from ig2mj.states.model import StateModel
+
+
+@pytest.fixture(scope="module")
+def sampler(tiny_home):
+    return make_sampler(tiny_home)
+
+
+@pytest.fixture(scope="module")
+def model(sampler) -> StateModel:
+    return sampler.model
+
+
+@pytest.fixture(scope="module")
+def start(sampler):
+    return sampler.start
+
+
+def planner_of(model, goal, hands=2):
+    return TaskPlanner(Domain(model, hands), compile_expression(model, goal, questions=HostQueries.of(model)))
+
+
+def plan_of(sampler, start, goal, hands=2):
+    planner = planner_of(sampler.model, goal, hands)
+    facts = SymbolicRung(planner.domain, sampler, [start]).facts(0)
+    return planner.plan(facts), facts
+
+
+def steps_of(sampler, start, goal, hands=2):
+    return [str(step) for step in plan_of(sampler, start, goal, hands)[0].steps]
+
+
+def started(sampler, start, *conditions):
+    """A start in which conditions hold."""
+    sampler.start_from(*start)
+    row = sampler.sample(read_conditions(conditions), np.random.default_rng(0), Budget(), collections.Counter())
+    sampler.start_from(*start)
+    return row.physics, row.states
+
+
+GOAL = (
+    "(and (inside apple cabinet) (not (open cabinet)) (not (stained pan)) (sliced apple) (toggled_on stove)"
+    " (on_top pan table) (not (dusty book)))"
+)
+
+
+@pytest.fixture(scope="module")
+def dirty(sampler, start):
+    return started(sampler, start, "(stained pan)", "(dusty book)")
+
+
+def test_a_plan_has_what_its_steps_need_before_them(sampler, dirty):
+    steps = steps_of(sampler, dirty, GOAL)
+    order = {step: k for k, step in enumerate(steps)}
+    assert order["grasp knife"] < order["slice apple knife"] < order["grasp apple"]
+    assert order["toggle_on sink"] < order["soak sponge sink"] < order["scrub pan sponge"]
+    assert order["open cabinet"] < order["place_inside apple cabinet"] < order["close cabinet"] == len(steps) - 1
+    assert "wipe book sponge" in order and "toggle_on stove" in order
+
+
+@pytest.mark.parametrize("hands", [1, 2])
+def test_a_plan_reaches_the_goal_by_the_rules_of_the_exported_pddl(sampler, dirty, hands):
+    plan, facts = plan_of(sampler, dirty, GOAL, hands)
+    world = World(domain_pddl(), problem_pddl("test", facts, plan))
+    assert set(world.actions) == set(PRIMITIVES) - {"navigate_to"}
+    assert not world.done()
+    for step in plan.steps:
+        assert world.act(step.primitive, step.arguments), f"{step} with {world.facts}"
+    assert world.done()
+
+
+def test_one_hand_puts_down_its_tool_before_it_takes_something_else(sampler, dirty):
+    steps = steps_of(sampler, dirty, GOAL, hands=1)
+    assert steps.index("release knife") < steps.index("grasp sponge") < steps.index("release sponge")
+
+
+def test_halves_are_moved_after_a_cut(sampler, start):
+    cut = started(sampler, start, "(sliced apple)")
+    steps = steps_of(sampler, cut, "(on_top apple table)")
+    moved = {s for s in steps if s.startswith("place")}
+    assert moved <= {"place_on_top apple_half_0 table", "place_on_top apple_half_1 table"}
+
+
+def test_what_a_plan_opens_or_switches_on_is_shut_and_switched_off_where_the_goal_says_so(sampler, dirty):
+    goal = "(and (inside ball cabinet) (not (open cabinet)) (not (stained pan)) (not (toggled_on sink)))"
+    steps = steps_of(sampler, dirty, goal)
+    assert {"open cabinet", "toggle_on sink"} < set(steps)
+    assert set(steps[-2:]) == {"close cabinet", "toggle_off sink"}
+
+
+def test_what_holds_needs_no_step_and_a_disjunction_takes_what_is_cheaper(sampler, start):
+    assert steps_of(sampler, start, "(not (open cabinet))") == []
+    assert steps_of(sampler, start, "(or (and (open cabinet) (sliced apple)) (toggled_on sink))") == ["toggle_on sink"]
+
+
+def test_failures_choose_another_object(sampler, start):
+    planner = planner_of(sampler.model, "(or (inside ball box) (inside can box))")
+    facts = SymbolicRung(planner.domain, sampler, [start]).facts(0)
+    first = planner.plan(facts).missing[0]
+    second = planner.plan(facts, {first: 1}).missing[0]
+    assert {first.arguments[0], second.arguments[0]} == {"ball", "can"}
+
+
+@pytest.mark.parametrize(
+    ("goal", "telling"),
+    [
+        ("(on_top table cabinet)", "(on_top table cabinet) is false, and 'table' is fixed"),
+        ("(frozen apple)", "(frozen apple) is false, and nothing in the scene is cold enough for 'apple'"),
+        ("(dusty book)", "(dusty book) is false, and no primitive makes 'book' dusty"),
+        ("(cooked ball)", "(cooked ball) is false, and 'ball' is not cookable"),
+        ("(and (open cabinet) (not (open cabinet)))", "contradict each other"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::ig2mj.predicates.AbilityWarning")
+def test_a_goal_that_cannot_be_is_refused_with_the_literal_and_why(sampler, start, goal, telling):
+    with pytest.raises(PlanningError, match="cannot become true") as error:
+        plan_of(sampler, start, goal)
+    assert telling in str(error.value)
+
+
+def test_a_robot_without_hands_and_requests_that_are_none_are_refused(model):
+    with pytest.raises(PlanningError, match="without hands"):
+        planner_of(model, "(open cabinet)", hands=0)
+    with pytest.raises(UnknownNameError, match="near matches: grasp"):
+        make_step("grsp", ["apple"])
+    with pytest.raises(PlanningError, match="place_inside' takes object and container, not 1 argument"):
+        make_step("place_inside", ["apple"])
+
+
+def test_the_symbolic_rung_reaches_a_goal_in_two_worlds_that_then_differ(sampler, dirty, start):
+    planner = planner_of(sampler.model, GOAL)
+    results = solve(planner, SymbolicRung(planner.domain, sampler, [dirty, start], seed=3))
+    assert [r.success for r in results] == [True, True] and [r.q for r in results] == [1.0, 1.0]
+    assert len(results[1].steps) < len(results[0].steps)
+    figures = summary(results, 1.0)
+    assert figures["success_rate"] == 1.0 and figures["episodes"] == 2 and figures["failures"] == {}
+
+
+def test_the_symbolic_rung_checks_what_a_primitive_needs(sampler, dirty):
+    domain = Domain(sampler.model, 1)
+
+    def outcome(*steps):
+        rung = SymbolicRung(domain, sampler, [dirty])
+        found = []
+        for primitive, *arguments in steps:
+            rung.begin(0, make_step(primitive, arguments))
+            found.append(rung.advance()[0])
+        return found[-1]
+
+    assert outcome(["grasp", "apple"]).done
+    assert "no hand holds apple" in outcome(["place_on_top", "apple", "table"]).detail
+    assert "hands are full: ball" in outcome(["grasp", "ball"], ["grasp", "apple"]).detail
+    assert "hands are full" in outcome(["grasp", "ball"], ["open", "cabinet"]).detail
+    assert "cabinet is not open" in outcome(["grasp", "ball"], ["place_inside", "ball", "cabinet"]).detail
+    assert "sponge is not soaked" in outcome(["grasp", "sponge"], ["scrub", "pan", "sponge"]).detail
+    assert "sink is not toggled on" in outcome(["grasp", "sponge"], ["soak", "sponge", "sink"]).detail
+    assert "stove is not toggled on" in outcome(["grasp", "apple"], ["cook", "apple", "stove"]).detail
+
+
+def test_an_episode_that_fails_ends_with_the_reason_and_its_partial_credit(sampler, start):
+    planner = planner_of(sampler.model, "(and (toggled_on stove) (inside rod pan))")
+    result = solve(planner, SymbolicRung(planner.domain, sampler, [start]))[0]
+    assert not result.success and result.q == 0.5
+    assert "(inside rod pan) failed 6 times" in result.ended
+    assert summary([result], 0.0)["failures"]["place_inside"]["not_true_after"] == 6
+
+
+def test_commands_print_the_plan_and_solve_it(tiny_home_folder, tmp_path, capsys):
+    goal = "(and (inside ball box) (open cabinet))"
+    assert call(["plan", str(tiny_home_folder), goal, "--json", "--pddl", str(tmp_path / "pddl")]) == 0
+    steps = json.loads(capsys.readouterr().out)["steps"]
+    assert [s["primitive"] for s in steps] == ["open", "grasp", "place_inside"]
+    assert "(inside ball box)" in (tmp_path / "pddl" / "problem.pddl").read_text()
+    results = tmp_path / "results.jsonl"
+    command = ["solve", str(tiny_home_folder), goal, "--episodes", "2", "--out", str(results), "--rung", "symbolic"]
+    assert call([*command, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["success_rate"] == 1.0
+    lines = results.read_text()
+    assert call(command) == 0 and results.read_text() == lines  # nothing is repeated
+    assert "100% of 2 episodes reach the goal" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "telling"),
+    [
+        (["plan", "storing_foot"], "near matches: storing_food"),
+        (["plan", "small_home"], "small_home is a scene: give a goal"),
+        (["plan", "HOME", "(inside aple box)"], "no object is named 'aple'; near matches: apple"),
+        (["plan", "HOME", "(inside ball box)", "--robot", "turtlebot"], "without hands"),
+        (["solve", "HOME", "(inside ball box)", "--episodes", "0"], "--episodes 0"),
+        (["solve", "PointNavigation"], "PointNavigation has no goal expression"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(tiny_home_folder, arguments, telling, capsys):
+    assert call([str(tiny_home_folder) if a == "HOME" else a for a in arguments]) == 2
+    said = capsys.readouterr().err
+    assert telling in said and said.count("\n") == 1
