@@ -45,7 +45,7 @@ def cheapest(expression: Expression, cost: Cost, wanted: bool = True) -> tuple[f
         case Exactly(count, parts):
             if wanted:
                 return _exactly(count, parts, cost)
-            others = [n for n in (count - 1, count + 1) if 0 <= n <= len(parts)]
+            others = [n for n in range(len(parts) + 1) if n != count]
             choices = [_exactly(n, parts, cost) for n in others]
             return min(choices, key=lambda choice: choice[0]) if choices else (math.inf, {})
         case Pairing(count, rows):

@@ -21,9 +21,6 @@ from ig2mj.sampling.conditions import Condition
 MOST_STEPS, EXTRA_STEPS = 4, 12
 """An episode ends after so many times the steps of its first plan, and so many more."""
 
-GIVE_UP = 6
-"""Failures of one condition after which an episode ends."""
-
 
 @dataclasses.dataclass(frozen=True)
 class StepRecord:
@@ -127,7 +124,7 @@ def _next(planner: TaskPlanner, rung: Rung, world: int, episode: _Episode, end: 
                 rung.begin(world, plan.steps[0])
                 return
         elif not plan.done:
-            ended = f"no step makes {plan.missing[0]} true"
+            ended = f"{plan.missing[0]} failed {episode.failed[plan.missing[0]]} times"
     truth = facts.truth(planner.goal.atoms)
     success = value_of(planner.goal.ground, truth)
     episode.result = EpisodeResult(
@@ -148,9 +145,6 @@ def _limit(episode: _Episode, end: float) -> str:
         return "the time limit passed"
     if len(episode.records) >= MOST_STEPS * episode.planned + EXTRA_STEPS:
         return f"{len(episode.records)} steps were not enough"
-    if episode.failed and episode.failed.most_common(1)[0][1] >= GIVE_UP:
-        condition, count = episode.failed.most_common(1)[0]
-        return f"{condition} failed {count} times"
     return ""
 
 

@@ -48,6 +48,9 @@ STEPS_OF = {
 PLACING, FAILED, REMEMBERED = 2.0, 3.0, 4
 """Steps of a placement; cost of each failure of a literal, in steps; failures of a literal that count at most."""
 
+LATER, GIVE_UP = 2, 6
+"""Failures of a condition after which the others come first, and after which no step is planned for it."""
+
 PLACE = {
     "inside": "place_inside",
     "on_top": "place_on_top",
@@ -67,7 +70,8 @@ class TaskPlan:
     """What is left to do in one world.
 
     Attributes:
-      steps: in order. missing: conditions of the reading that are false now. wanted: all conditions of the reading.
+      steps: in order; none for conditions that have failed `GIVE_UP` times.
+      missing: conditions of the reading that are false now. wanted: all conditions of the reading.
     """
 
     steps: tuple[Step, ...]
@@ -185,7 +189,9 @@ class _Builder:
         order = [*opens, *first, *away, *down, *frozen, *switches, *shut]
         in_hand = [c for c in order if c.arguments[0] in self._held and c.predicate in (*PLACE, *_FIRST)]
         tools = [c for c in order if c.predicate in ("dusty", "stained", "sliced") and self._tool(c) in self._held]
-        return list(dict.fromkeys([*tools, *in_hand, *order]))
+        order = list(dict.fromkeys([*tools, *in_hand, *order]))
+        tried = [c for c in order if self._failed.get(c, 0) < GIVE_UP]
+        return sorted(tried, key=lambda c: self._failed.get(c, 0) >= LATER)
 
     def _supports_first(self, places: Sequence[Condition]) -> list[Condition]:
         graph = networkx.DiGraph()
@@ -218,13 +224,13 @@ class _Builder:
         elif c.predicate == "toggled_on":
             self._switch(name, c.value)
         elif c.predicate == "soaked":
-            for part in self._parts(name):
+            for part in self._parts(name, c):
                 self._soak(part)
         elif c.predicate == "cooked":
-            for part in self._parts(name):
+            for part in self._parts(name, c):
                 self._cook(part)
         elif c.predicate == "frozen":
-            for part in self._parts(name):
+            for part in self._parts(name, c):
                 self._freeze(part)
         elif c.predicate == "sliced":
             knife = self._tool(c)
@@ -233,16 +239,20 @@ class _Builder:
             self._add("slice", name, knife)
         else:
             tool = self._tool(c)
+            for part in self._parts(name, c):
+                self._reach(part)
             if c.predicate == "stained" and not self._soaked(tool):
                 self._soak(tool)
             self._take(tool)
-            for part in self._parts(name):
-                self._reach(part)
+            for part in self._parts(name, c):
                 self._add("scrub" if c.predicate == "stained" else "wipe", part, tool)
 
-    def _parts(self, name: str) -> tuple[str, ...]:
-        """The object, or its halves where it has been cut."""
-        return self._domain.halves(name) if self._facts.sliced(name) else (name,)
+    def _parts(self, name: str, c: Condition) -> tuple[str, ...]:
+        """The object of a condition, or of its halves, where it has been cut, those of which it is false."""
+        if not self._facts.sliced(name):
+            return (name,)
+        own = {h: tuple(h if a == name else a for a in c.arguments) for h in self._domain.halves(name)}
+        return tuple(h for h, arguments in own.items() if self._facts.holds(c.predicate, *arguments) != c.value)
 
     def _tool(self, c: Condition) -> str:
         """What cleans or cuts: one in a hand first, then a soaked one for stains, then one that is not shut in; after
@@ -369,7 +379,7 @@ class _Builder:
         mover = self._domain.mover(c)
         if c.value and c.predicate in SYMMETRIC and self._failed.get(c, 0) % 2:  # after a failure, the other object
             mover = next((a for a in c.arguments if a != mover and not self._domain.fixed(a)), mover)
-        for name in self._parts(mover):
+        for name in self._parts(mover, c):
             if not c.value:
                 if not self._moved(name):
                     self._away(name, c)

@@ -84,13 +84,14 @@ class FloorMap:
 
         number = np.full(self.free.shape, -1)
         number[self.free] = np.arange(int(self.free.sum()))
-        graph = self._graph(number)
+        graph = self.graph(number)
         found = csgraph.dijkstra(graph, directed=False, indices=number[tuple(goals.T)])
         fields = np.full((len(goals), *self.free.shape), np.inf, np.float32)
         fields[:, self.free] = found
         return fields
 
-    def _graph(self, number: Int[np.ndarray, "h w"]) -> scipy.sparse.csr_matrix:
+    def graph(self, number: Int[np.ndarray, "h w"]) -> scipy.sparse.csr_matrix:
+        """Steps between free cells with their lengths, m, each once; `number` is a cell's row of the matrix."""
         import scipy.sparse
 
         starts, ends, lengths = [], [], []

@@ -1,0 +1,237 @@
+"""How a robot's own action moves its base and hands: one class for each kind of base.
+
+`command` gives numbers of the controller's action in its own units. All of it is pure and batched.
+
+Axes: W worlds, n numbers of a robot's action, H hands of the robot.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.agents.base import Controller
+from ig2mj.agents.task_robot import HandControl, TaskRobot
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import (
+    length,
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate,
+    quat_rotate_inverse,
+    quat_to_rotation_vector,
+)
+from ig2mj.planning.phases import Base
+from ig2mj.planning.steps import PlanningError
+from ig2mj.scene.scene import Scene
+
+AHEAD = 0.35
+"""rad of a base's direction from that of the way within which it drives; else it turns first."""
+
+AT_ONCE = 0.06
+"""m from a point within which a base need not face it."""
+
+TURN_STEP, HAND_TURN_STEP = 0.25, 0.2
+"""rad in an agent step: of a base that moves sideways, and of a hand."""
+
+GAIN, MOST = 1.2, 0.5
+"""Of a wheeled base: command of its turning for each rad (1 is its greatest speed), and the greatest command of turning
+and driving."""
+
+_BODY = tuple(f"body_{n}" for n in ("x", "y", "z", "roll", "pitch", "yaw"))
+
+UPRIGHT = 0.5
+"""Share of a hovering body's tilt and of its error of height that is taken back in an agent step."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Senses:
+    """What executing a program reads of the view; world frame, m, w-x-y-z."""
+
+    base_pos: Float[np.ndarray, "W 3"]
+    base_quat: Float[np.ndarray, "W 4"]
+    hand_pos: Float[np.ndarray, "W H 3"]
+    hand_quat: Float[np.ndarray, "W H 4"]
+    held: Bool[np.ndarray, "W H O"]
+    touching: Bool[np.ndarray, "W O"]
+
+    @property
+    def yaw(self) -> Float[np.ndarray, "W"]:
+        """Direction of the base, rad."""
+        w, x, y, z = np.moveaxis(self.base_quat, -1, 0)
+        return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def sense(view: PhysicsView, agent: int, hands: Int[np.ndarray, "H"]) -> Senses:
+    """What the view says of one robot."""
+    a = view.agent
+    return Senses(
+        base_pos=np.asarray(a.base_pos)[:, agent],
+        base_quat=np.asarray(a.base_quat)[:, agent],
+        hand_pos=np.asarray(a.hand_pos)[:, hands],
+        hand_quat=np.asarray(a.hand_quat)[:, hands],
+        held=np.asarray(view.held)[:, hands],
+        touching=np.asarray(a.touching)[:, agent],
+    )
+
+
+Rows = Mapping[str, np.ndarray]
+"""The present phases, from `Programs.at`."""
+
+
+@runtime_checkable
+class Body(Protocol):
+    """A robot as programs move it.
+
+    Attributes:
+      size: n. hands: numbers of its hands among all hands of the scene. grips: [H, 3] m, the point with which each hand
+        takes hold, in its frame. sideways: its base moves in any direction.
+    """
+
+    size: int
+    hands: Int[np.ndarray, "H"]
+    grips: Float[np.ndarray, "H 3"]
+    sideways: bool
+
+    def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
+        """The controller's action of the present phases."""
+        ...
+
+
+def body_of(scene: Scene, controller: Controller, agent: int = 0) -> Body:
+    """How programs move a robot of a scene.
+
+    Raises:
+      PlanningError: its base neither hovers nor drives.
+    """
+    names = tuple(controller.action_names)
+    if "body_x" in names:
+        return HoveringBody(scene, controller, agent)
+    if {"forward", "turn_left"} <= set(names):
+        return WheeledBody(scene, controller, agent)
+    raise PlanningError(f"robot '{scene.tables.agent_names[agent]}' has no base that planned ways can move")
+
+
+class _Body:
+    def __init__(self, scene: Scene, controller: Controller, agent: int):
+        robot = scene.agents[agent]
+        self._names, self.size = tuple(controller.action_names), controller.action_size
+        self.hands: Int[np.ndarray, "H"] = np.flatnonzero(scene.tables.hand_agent == agent)
+        rays = robot.hand_rays() if isinstance(robot, TaskRobot) else ()
+        self.grips: Float[np.ndarray, "H 3"] = np.array([r.grasp_point for r in rays], float).reshape(-1, 3)
+        controls: Sequence[HandControl] = robot.hand_controls if isinstance(robot, TaskRobot) else ()
+        self._controls = controls
+        self._rest = np.zeros(self.size, np.float32)
+        for control in controls:
+            if control.rests_open:
+                self._rest[self._names.index(control.close)] = control.opens
+
+    def _places(self, *names: str) -> list[int]:
+        return [self._names.index(name) for name in names]
+
+
+class WheeledBody(_Body):
+    """A base on two driven wheels: it turns on the spot and drives forwards. Its hands stay as they are."""
+
+    sideways = False
+
+    def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
+        action = np.tile(self._rest, (len(senses.base_pos), 1))
+        forward, turn = self._places("forward", "turn_left")
+        offset = rows["xy"] - senses.base_pos[:, :2]
+        apart = np.linalg.norm(offset, axis=1)
+        drives = (rows["base"] == Base.DRIVE) | (rows["base"] == Base.SHIFT)
+        heading = np.where(drives, np.arctan2(offset[:, 1], offset[:, 0]), rows["yaw"])
+        left = _wrapped(heading - senses.yaw)
+        acts = rows["base"] != Base.STAY
+        action[:, turn] = np.where(acts, np.clip(GAIN * left, -MOST, MOST), 0.0)
+        ahead = drives & (np.abs(left) < AHEAD)
+        action[:, forward] = np.where(ahead, np.clip(GAIN * apart, 0.0, MOST) * np.cos(left), 0.0)
+        return action
+
+
+class HoveringBody(_Body):
+    """The humanoid: a body that moves in any direction, and hands whose targets are displaced in its frame."""
+
+    sideways = True
+
+    def __init__(self, scene: Scene, controller: Controller, agent: int):
+        super().__init__(scene, controller, agent)
+        robot = scene.agents[agent]
+        self._stands = float(robot.stands) if isinstance(robot, TaskRobot) else 0.0
+
+    def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
+        action = np.tile(self._rest, (len(senses.base_pos), 1))
+        action[:, self._places(*_BODY)] = self._base(senses, rows)
+        for number, control in enumerate(self._controls):
+            mine = rows["hand"] == number
+            move, turn = self._hand(senses, rows, number)
+            action[:, self._places(*control.move)] = np.where(mine[:, None], move, 0.0)
+            action[:, self._places(*control.turn)] = np.where(mine[:, None], turn, 0.0)
+            close = np.where(rows["close"] < 0, 0.0, np.where(rows["close"] > 0, -control.opens, control.opens))
+            action[:, self._places(control.close)] = np.where(mine, close, 0.0)[:, None]
+            reset = control.close.replace("trigger", "reset")
+            if reset in self._names:
+                action[:, self._places(reset)] = np.where(mine & (rows["reset"] > 0), 1.0, 0.0)[:, None]
+        return action
+
+    def _base(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W 6"]:
+        """Displacement and turn of the body in its own frame; it is kept upright and at its height."""
+        mode = rows["base"]
+        offset = rows["xy"] - senses.base_pos[:, :2]
+        apart = np.linalg.norm(offset, axis=1)
+        heading = np.where(mode == Base.DRIVE, np.arctan2(offset[:, 1], offset[:, 0]), rows["yaw"])
+        left = _wrapped(heading - senses.yaw)
+        left = np.where((mode == Base.STAY) | ((mode == Base.DRIVE) & (apart < AT_ONCE)), 0.0, left)
+        moves = (mode == Base.SHIFT) | ((mode == Base.DRIVE) & (np.abs(left) < AHEAD))
+        speed = np.where(rows["hand"] >= 0, SPEED_OF_BASE, rows["speed"])
+        share = np.where(moves, np.minimum(1.0, speed / np.maximum(apart, 1e-6)), 0.0)
+        rise = UPRIGHT * (self._stands - senses.base_pos[:, 2])
+        move = np.concatenate([share[:, None] * offset, np.clip(rise, -0.05, 0.05)[:, None]], axis=1)
+        up = np.array([0.0, 0.0, 1.0], np.float32)
+        axis = np.asarray(quat_rotate(senses.base_quat, np.broadcast_to(up, move.shape)))
+        turn = UPRIGHT * np.cross(axis, up)
+        turn[:, 2] = np.clip(left, -TURN_STEP, TURN_STEP)
+        own = [np.asarray(quat_rotate_inverse(senses.base_quat, v.astype(np.float32))) for v in (move, turn)]
+        return np.concatenate(own, axis=1)
+
+    def _hand(
+        self, senses: Senses, rows: Rows, number: int
+    ) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"]]:
+        """Displacement and turn of one hand in the body's frame."""
+        base, quat = senses.base_quat, senses.hand_quat[:, number]
+        pos, wanted = goals_of_hand(senses, rows)
+        grip = grip_of(senses, number, self.grips[number])
+        move = np.where(rows["moves"][:, None] > 0, np.asarray(quat_rotate_inverse(base, pos - grip)), 0.0)
+        move *= np.minimum(1.0, rows["speed"] / np.maximum(np.asarray(length(move)), 1e-6))[:, None]
+        left = np.asarray(quat_to_rotation_vector(quat_multiply(wanted, quat_conjugate(quat))))
+        turn = np.where(rows["turns"][:, None] > 0, np.asarray(quat_rotate_inverse(base, left)), 0.0)
+        turn *= np.minimum(1.0, HAND_TURN_STEP / np.maximum(np.asarray(length(turn)), 1e-6))[:, None]
+        return move, turn
+
+
+SPEED_OF_BASE = 0.05
+"""m in an agent step of a base that moves together with a hand."""
+
+
+def goals_of_hand(senses: Senses, rows: Rows) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 4"]]:
+    """Where the phases want the hands' grasp points, and how they want the hands turned; world frame."""
+    inside = rows["in_body"] > 0
+    pos = senses.base_pos + np.asarray(quat_rotate(senses.base_quat, rows["pos"]))
+    quat = np.asarray(quat_multiply(senses.base_quat, rows["quat"]))
+    return np.where(inside[:, None], pos, rows["pos"]), np.where(inside[:, None], quat, rows["quat"])
+
+
+def grip_of(senses: Senses, number: int, grip: Array) -> Float[np.ndarray, "W 3"]:
+    """Where a hand's grasp point is, world frame, m."""
+    point = np.broadcast_to(np.asarray(grip, np.float32), senses.hand_pos[:, number].shape)
+    return senses.hand_pos[:, number] + np.asarray(quat_rotate(senses.hand_quat[:, number], point))
+
+
+def _wrapped(angle: Float[np.ndarray, "W"]) -> Float[np.ndarray, "W"]:
+    """The same angle in [-pi, pi)."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi

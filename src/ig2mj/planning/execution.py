@@ -1,0 +1,129 @@
+"""Following motion programs in a batch of worlds: `start(programs)`, then `advance(view)` once for each agent step.
+
+Axes: W worlds, n numbers of the robot's action.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import PhysicsView
+from ig2mj.geometry.poses import rotation_angle
+from ig2mj.planning.bodies import Body, Rows, Senses, goals_of_hand, grip_of, sense
+from ig2mj.planning.phases import REASON_NUMBERS, Base, Phase, Programs, Until
+
+RUNNING, DONE = -1, 0
+"""Statuses; larger ones are numbers of `REASON_NUMBERS`."""
+
+SETTLING = 2
+"""Agent steps that a phase lasts at least: a hand that is asked to open or close needs them."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Carry:
+    """What following programs remembers.
+
+    Attributes:
+      programs: of all worlds. phase: number of the present one. steps: agent steps in it. status: of each world.
+    """
+
+    programs: Programs
+    phase: Int[np.ndarray, "W"]
+    steps: Int[np.ndarray, "W"]
+    status: Int[np.ndarray, "W"]
+
+    @property
+    def running(self) -> Bool[np.ndarray, "W"]:
+        """Worlds whose programs go on."""
+        return self.status == RUNNING
+
+    def reason(self, world: int) -> str:
+        """Why a world's program failed; "" where it has not."""
+        return REASON_NUMBERS[max(int(self.status[world]), 0)]
+
+
+def begin(programs: Sequence[Sequence[Phase]]) -> Carry:
+    """Programs at their start; an empty one is done."""
+    packed = Programs.pack(programs)
+    zero = np.zeros(len(programs), np.int32)
+    return Carry(packed, zero, zero, np.where(packed.length > 0, RUNNING, DONE).astype(np.int32))
+
+
+def begin_some(carry: Carry, programs: Sequence[Sequence[Phase] | None], kept: Sequence[Sequence[Phase]]) -> Carry:
+    """New programs in some worlds; the others go on.
+
+    Args:
+      programs: None where a world goes on. kept: the programs of all worlds that `carry` follows.
+    """
+    fresh = begin([kept[w] if p is None else p for w, p in enumerate(programs)])
+    new = np.array([p is not None for p in programs])
+    return Carry(
+        fresh.programs,
+        np.where(new, 0, carry.phase),
+        np.where(new, 0, carry.steps),
+        np.where(new, fresh.status, carry.status),
+    )
+
+
+def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Float[np.ndarray, "W n"], Carry]:
+    """The robot's action in every world, in its controller's units, and what is remembered. Pure.
+
+    Args:
+      view: of the present physics. Worlds whose programs have ended get an action that leaves everything as it is.
+    """
+    senses = sense(view, agent, body.hands)
+    rows = carry.programs.at(carry.phase)
+    there, lost = _ended(body, senses, rows), _lost(senses, rows)
+    there &= carry.steps >= np.where(rows["close"] >= 0, SETTLING, 0)
+    late = carry.steps >= rows["limit"]
+    waited = late & (rows["until"] == Until.WAITED)
+    failed = np.where(lost, REASON_NUMBERS.index("slipped"), np.where(late & ~there & ~waited, rows["after"], 0))
+    passed = there | waited | (late & (failed == 0))
+    running = carry.running
+    forward = running & passed & (failed == 0)
+    phase = np.where(forward, carry.phase + 1, carry.phase)
+    finished = forward & (phase >= carry.programs.length)
+    status = np.where(running & (failed > 0), failed, np.where(finished, DONE, carry.status))
+    new = Carry(carry.programs, phase, np.where(forward, 0, carry.steps + 1), status.astype(np.int32))
+    rows = new.programs.at(new.phase)
+    going = new.running
+    still = {**rows, "base": np.where(going, rows["base"], Base.STAY), "hand": np.where(going, rows["hand"], -1)}
+    return body.command(senses, still).astype(np.float32), new
+
+
+def _ended(body: Body, senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
+    """Worlds in which the present phase has reached its end."""
+    apart = np.linalg.norm(rows["xy"] - senses.base_pos[:, :2], axis=1)
+    turned = np.abs((rows["yaw"] - senses.yaw + np.pi) % (2 * np.pi) - np.pi)
+    moves = (rows["base"] == Base.DRIVE) | (rows["base"] == Base.SHIFT)
+    turns = (rows["base"] == Base.TURN) | (rows["base"] == Base.SHIFT)
+    there = (~moves | (apart < rows["tolerance"])) & (~turns | (turned < rows["turn_tolerance"]))
+    held, empty = np.zeros(len(there), bool), np.ones(len(there), bool)
+    world, index = np.arange(len(there)), np.maximum(rows["object"], 0)
+    pos, quat = goals_of_hand(senses, rows)
+    for number in range(len(body.hands)):
+        mine = rows["hand"] == number
+        grip = grip_of(senses, number, body.grips[number])
+        near = np.linalg.norm(pos - grip, axis=1) < rows["tolerance"]
+        angle = np.asarray(rotation_angle(senses.hand_quat[:, number], quat))
+        near = ((rows["moves"] == 0) | near) & ((rows["turns"] == 0) | (angle < rows["turn_tolerance"]))
+        there &= ~mine | near
+        held |= mine & senses.held[world, number, index]
+        empty &= ~mine | ~senses.held[:, number].any(1)
+    touched = senses.touching[world, index]
+    until = rows["until"]
+    return np.select(
+        [until == Until.HELD, until == Until.TOUCHED, until == Until.EMPTY, until == Until.WAITED],
+        [held, touched, empty, np.zeros(len(there), bool)],
+        there,
+    )
+
+
+def _lost(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
+    """Worlds in which what had to stay in a hand is in none."""
+    kept = senses.held[np.arange(len(rows["keeps"])), :, np.maximum(rows["keeps"], 0)].any(1)
+    return (rows["keeps"] >= 0) & ~kept

@@ -1,0 +1,95 @@
+"""`BaseFootprint`: the space that a robot and what it holds take up when it drives: discs about its axis, by height."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import mujoco
+import numpy as np
+
+from ig2mj.engine.view import PhysicsView
+from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.scene.scene import Scene
+
+LOWEST, SLICE, TOP = 0.05, 0.25, 2.0
+"""m: what is lower does not count, since wheels and hovering bodies pass over it; height of a slice; of the top."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Disc:
+    """Everything between two heights (m above the floor) is within `radius` (m) of the robot's vertical axis."""
+
+    low: float
+    high: float
+    radius: float
+
+
+@dataclasses.dataclass(frozen=True)
+class BaseFootprint:
+    """See the module's text. Turning does not change it."""
+
+    discs: tuple[Disc, ...]
+
+    @property
+    def radius(self) -> float:
+        """Of the widest disc, m."""
+        return max(d.radius for d in self.discs)
+
+    def holding(self, low: float, high: float, radius: float) -> BaseFootprint:
+        """With something between two heights that reaches `radius` from the axis, m."""
+        return BaseFootprint(_merged([*self.discs, Disc(max(low, LOWEST), high, radius)]))
+
+    @classmethod
+    def of_robot(cls, scene: Scene, view: PhysicsView, agent: int = 0, world: int = 0) -> BaseFootprint:
+        """That of a robot as it stands in a view.
+
+        Args:
+          view: with a world axis; `world` of it. agent: number of the robot.
+        """
+        model, tables = scene.model, scene.tables
+        geoms = np.flatnonzero(
+            (tables.body_agent[model.geom_bodyid] == agent) & ((model.geom_contype | model.geom_conaffinity) != 0)
+        )
+        bodies = model.geom_bodyid[geoms]
+        pos, quat = (np.asarray(a)[world, bodies] for a in (view.body_pos, view.body_quat))
+        turn = matrices_on_host(quat)
+        middle = pos + np.einsum("nij,nj->ni", turn, model.geom_pos[geoms])
+        frame = turn @ matrices_on_host(model.geom_quat[geoms])
+        axis = np.asarray(view.agent.base_pos)[world, agent]
+        offset = middle - axis
+        floor = float(axis[2]) - scene.agents[agent].stands if hasattr(scene.agents[agent], "stands") else 0.0
+        discs = []
+        for k, geom in enumerate(geoms):
+            flat, tall = _extent(model, int(geom), frame[k])
+            low, high = middle[k, 2] - tall - floor, middle[k, 2] + tall - floor
+            discs.append(Disc(float(low), float(high), float(np.linalg.norm(offset[k, :2]) + flat)))
+        return cls(_merged(discs))
+
+
+def _extent(model: mujoco.MjModel, geom: int, frame: np.ndarray) -> tuple[float, float]:
+    """Half extents of a geom about its middle: horizontal, from the vertical axis, and vertical, m."""
+    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
+    if kind == int(mujoco.mjtGeom.mjGEOM_SPHERE):
+        return float(size[0]), float(size[0])
+    if kind in (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)):
+        along, round_ = frame[:, 2] * size[1], float(size[0])
+        return float(np.hypot(*along[:2])) + round_, abs(float(along[2])) + round_
+    box = model.geom_aabb[geom]
+    corners = (frame @ (np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1) * box[3:, None] + box[:3, None])).T
+    return float(np.linalg.norm(corners[:, :2], axis=1).max()), float(np.abs(corners[:, 2]).max())
+
+
+def _merged(discs: list[Disc]) -> tuple[Disc, ...]:
+    """The same as slices of equal height: the widest of each, equal neighbours as one."""
+    edges = np.arange(LOWEST, TOP + SLICE, SLICE)
+    found: list[Disc] = []
+    for low, high in itertools.pairwise(edges):
+        radius = max((d.radius for d in discs if d.high > low and d.low < high), default=0.0)
+        if radius == 0.0:
+            continue
+        if found and found[-1].high == low and found[-1].radius == radius:
+            found[-1] = dataclasses.replace(found[-1], high=float(high))
+        else:
+            found.append(Disc(float(low), float(high), radius))
+    return tuple(found)
