@@ -8,6 +8,7 @@ import itertools
 import mujoco
 import numpy as np
 
+from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.scene.scene import Scene
@@ -58,7 +59,8 @@ class BaseFootprint:
         frame = turn @ matrices_on_host(model.geom_quat[geoms])
         axis = np.asarray(view.agent.base_pos)[world, agent]
         offset = middle - axis
-        floor = float(axis[2]) - scene.agents[agent].stands if hasattr(scene.agents[agent], "stands") else 0.0
+        robot = scene.agents[agent]
+        floor = float(axis[2]) - robot.stands if isinstance(robot, TaskRobot) else 0.0
         discs = []
         for k, geom in enumerate(geoms):
             flat, tall = _extent(model, int(geom), frame[k])

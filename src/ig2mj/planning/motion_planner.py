@@ -22,6 +22,9 @@ from ig2mj.planning.occupancy import RESOLUTION, Occupancy, door_objects
 from ig2mj.scene.scene import Scene
 from ig2mj.tasks.navigation.floor import FloorMap
 
+Point = Sequence[float] | np.ndarray
+"""World x and y, m."""
+
 NEAR_GOAL, NEAR_START = 0.15, 0.5
 """m from the goal within which a free cell will do, and from the robot within which the way may begin."""
 
@@ -62,7 +65,7 @@ class FreeFloor:
     free: Bool[np.ndarray, "h w"]
     spare: Float[np.ndarray, "h w"]
 
-    def nearest(self, xy: Sequence[float], within: float) -> Int[np.ndarray, "2"] | None:
+    def nearest(self, xy: Point, within: float) -> Int[np.ndarray, "2"] | None:
         """The free cell nearest to a point, m; None: there is none within `within`."""
         reach = int(np.ceil(within / RESOLUTION))
         row, column = self.occupancy.cells(np.asarray(xy, float))
@@ -75,11 +78,11 @@ class FreeFloor:
         best = int(np.argmin(apart))
         return cells[best] if apart[best] <= within else None
 
-    def distances(self, xy: Sequence[float]) -> Float[np.ndarray, "h w"]:
+    def distances(self, xy: Point) -> Float[np.ndarray, "h w"]:
         """m along the floor from each cell to a point, with the surcharge of narrow places; infinite without a way."""
         return self._field(xy)[0]
 
-    def way(self, start: Sequence[float], goal: Sequence[float]) -> Float[np.ndarray, "N 2"] | None:
+    def way(self, start: Point, goal: Point) -> Float[np.ndarray, "N 2"] | None:
         """Points of a way between two positions, straightened; None where there is none."""
         begin = self.nearest(start, NEAR_START)
         if begin is None:
@@ -92,7 +95,7 @@ class FreeFloor:
             cells.append(np.array(divmod(int(after), width)))
         return np.concatenate([np.asarray(start, float)[None], self.occupancy.middles(self._straightened(cells))])
 
-    def _field(self, goal: Sequence[float]) -> tuple[Float[np.ndarray, "h w"], Int[np.ndarray, "h w"]]:
+    def _field(self, goal: Point) -> tuple[Float[np.ndarray, "h w"], Int[np.ndarray, "h w"]]:
         """Distance of every cell to a goal, and the next cell of the way (row times width and column; -1: none)."""
         from scipy.sparse import csgraph
 
@@ -166,7 +169,7 @@ class MotionPlanner:
     def plan_base(
         self,
         view: PhysicsView,
-        goal: Sequence[float],
+        goal: Point,
         *,
         yaw: float | None = None,
         footprint: BaseFootprint | None = None,
@@ -199,7 +202,7 @@ class MotionPlanner:
         self,
         view: PhysicsView,
         here: Float[np.ndarray, "1 2"],
-        goal: Sequence[float],
+        goal: Point,
         footprint: BaseFootprint | None,
         without: Collection[int],
         world: int,
