@@ -14,12 +14,13 @@ from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.errors import Ig2mjError
 
 from .base import inputs
-from .base.description import Instance, ObjectModel, SceneDescription
+from .base.description import ROBOT_CATEGORY, Instance, ObjectModel, SceneDescription
 from .base.process_pool import TaskPool
 from .base.read_limits import ReadLimits, limits, limits_of
 from .bodies.assembly import Assembly, assemble
 from .bodies.inertia import MassRule, link_inertials
 from .bodies.kinematics import model_bounds
+from .bodies.robot_description import grasping_links
 from .checks.plausible import implausible
 from .hulls.link_hulls import LinkPieces, all_cached, decompose_links, scaled_pieces
 from .hulls.pieces import HullOptions, LinkHulls
@@ -129,10 +130,19 @@ def decompose_model(
 ) -> dict[str, LinkPieces]:
     """The convex pieces of every link of a model as it was read, unscaled: the work that takes long.
 
+    Of a robot only the base and what may hold something are cut up (`grasping_links`). The other links of its arms get
+    one hull for each mesh: they touch nothing but obstacles, and cutting them up takes minutes.
+
     pool: does shapes and parts of all links side by side.
     """
     links = {name: link.collisions for name, link in scale_model(model, 1.0).links.items()}
-    return decompose_links(links, hulls, pool, progress)
+    if model.category != ROBOT_CATEGORY:
+        return decompose_links(links, hulls, pool, progress)
+    cut = {model.base, *grasping_links(model)}
+    found = decompose_links({name: links[name] for name in links if name in cut}, hulls, pool, progress)
+    plain = dataclasses.replace(hulls, whole_meshes=True)
+    found |= decompose_links({name: links[name] for name in links if name not in cut}, plain, pool, progress)
+    return {name: found[name] for name in links}
 
 
 def build_model(

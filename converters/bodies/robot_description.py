@@ -16,6 +16,9 @@ ROBOT_FILE = "robot.json"
 
 FORMAT_VERSION = 1
 
+LAST_JOINTS = 2
+"""Joints in a row at the end of an arm whose links may hold something."""
+
 
 def put_on_floating_base(source: ObjectModel) -> None:
     """Makes the child of a floating joint the base where nothing but that joint hangs on the base, an empty link.
@@ -32,6 +35,20 @@ def put_on_floating_base(source: ObjectModel) -> None:
     elif floating:
         element = f"joint '{floating[0].name}'"
         raise InputError(source.file, "a floating joint cuts the robot in two", element=element, fix="make it fixed")
+
+
+def grasping_links(source: ObjectModel) -> set[str]:
+    """The links at the ends of a robot's arms: those below the last two joints in a row that move, with what is fixed
+    to them; of a hand also the one that its fingers hang on, and all between them."""
+    joints = {joint.child: joint for joint in source.joints.values()}
+    below: dict[str, list[str]] = {}
+    for joint in source.joints.values():
+        below.setdefault(joint.parent, []).append(joint.child)
+    levels: dict[str, int] = {}
+    for link in reversed(list(link_poses(source, {}))):  # children come before their parents
+        moved = [levels[c] + (joints[c].type != "fixed" and not is_locked(joints[c])) for c in below.get(link, [])]
+        levels[link] = max(moved, default=0)
+    return {link for link, level in levels.items() if level < LAST_JOINTS}
 
 
 def robot_json(source: ObjectModel) -> str:

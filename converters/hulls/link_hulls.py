@@ -324,6 +324,8 @@ def _key(shapes: Sequence[Shape], options: HullOptions, size: ModelSize) -> str:
         rules |= {"coarse": [COARSE_FACES, COARSE_TOLERANCES], "time_limit": size.seconds(options)}
     for no_matter in ("threads", "cache", "max_hull_vertices", "primitives"):
         del rules[no_matter]
+    if not options.whole_meshes:
+        del rules["whole_meshes"]
     given = [
         [s.kind, s.pose, [float(x) for x in s.size], [float(x) for x in s.scale], s.grouped, s.name]
         + [[m.name, np.asarray(m.vertices, np.float64), np.asarray(m.faces, np.int64)] for m in s.meshes]

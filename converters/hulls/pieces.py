@@ -34,6 +34,7 @@ class HullOptions:
       time_limit: seconds of processor time for all CoACD runs on one link.
       min_thickness: flat pieces are thickened to this, metres.
       seed: CoACD's.
+      whole_meshes: one hull for each mesh (or group of it), however concave.
       threads: CoACD's; does not change the result.
       cache: look up and keep results in the user's cache folder.
     """
@@ -49,6 +50,7 @@ class HullOptions:
     time_limit: float = 60.0
     min_thickness: float = 1e-3
     seed: int = 0
+    whole_meshes: bool = False
     threads: int = 1
     cache: bool = True
 

@@ -182,6 +182,9 @@ def _take_soup(meshes: list[Mesh], label: str, options: HullOptions, out: ShapeP
         return
     volume = enclosed_volume(solid, whole)
     out.enclose(volume)
+    if options.whole_meshes:
+        out.items.append(Convex(whole, "hull"))
+        return
     ratio, depth = options.hull_ratio, options.hull_depth
     hollow = any(p.hollow for p in solid)
     if not hollow and hull_stands_for(whole, vertices[faces], volume, ratio, depth):

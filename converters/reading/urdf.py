@@ -21,7 +21,7 @@ from .urdf_leftovers import read_leftovers
 from .urdf_materials import UrdfMaterials
 from .urdf_tree import check_counts, check_name, find_tree
 
-JOINT_TYPES = ("fixed", "revolute", "prismatic", "continuous", "floating")
+JOINT_TYPES = ("fixed", "revolute", "prismatic", "continuous", "floating", "planar")
 MOVING = ("revolute", "prismatic", "continuous")
 
 
@@ -115,6 +115,9 @@ def _read_joint(element: Element, file: pathlib.Path, warnings: list[str]) -> Jo
         raise InputError(
             file, f"joint type '{kind}' is not supported", element=where(element), fix=f"use {', '.join(JOINT_TYPES)}"
         )
+    if kind == "planar":
+        warnings.append(f"joint '{name}' is planar: it is read as floating")
+        kind = "floating"
     ends = []
     for tag in ("parent", "child"):
         end = element.find(tag)

@@ -141,7 +141,7 @@ def test_a_fixed_base_stays(folder, home):
             InputError,
             "drive has two wheels, .* not 1",
         ),
-        ({"base": "hovering"}, InputError, "use differential or fixed"),
+        ({"base": "hovering"}, InputError, "use differential, skid_steer, omnidirectional or fixed"),
         ({"arm": ["wrist", "left_finger_joint"]}, InputError, "of the arm and of the gripper"),
         ({"gripper": ["left_wheel_joint"], "base": "fixed", "arm": []}, InputError, "no two ends"),
         ({"start": {"lift": 4.0}}, InputError, "goes from -1.5 to 1.5"),

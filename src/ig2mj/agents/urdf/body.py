@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import mujoco
@@ -30,12 +31,19 @@ MODEL_FILE = "object.xml"
 
 SCALAR = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
+GLIDE_SPEED, GLIDE_TURN, GLIDE_ACCELERATION = 1.0, 2.0, 4.0
+"""m/s, rad/s and m/s2: most of an omnidirectional base."""
+
+ROUND = (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE)
+
+SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+
 
 class RobotBody:
     """A converted robot compiled alone, at joint positions 0.
 
     Attributes:
-      height: m of the base's frame above the floor that it stands on. base: the root link.
+      height: m of the base's frame above the floor that it stands on, at joint positions 0. base: the root link.
       couplings: joints that follow others (`<mimic>`), by name.
     """
 
@@ -148,13 +156,91 @@ class RobotBody:
         prefix = f"{self._description.name}_"
         return [self.start_of(self._model.joint(j).name.removeprefix(prefix), layout) for j in self._scalar]
 
+    def hub(self, joint: str) -> np.ndarray:
+        """Where a joint's axis is [3], in the base's frame, m."""
+        found = self._data.joint(f"{self._description.name}_{joint}")
+        return self._base_turn.T @ (found.xanchor - self._data.body(self._own(self.base)).xpos)
+
+    def axis(self, joint: str) -> np.ndarray:
+        """Unit vector [3] along a joint's axis, in the base's frame."""
+        return self._base_turn.T @ self._data.joint(f"{self._description.name}_{joint}").xaxis
+
+    @property
+    def _base_turn(self) -> np.ndarray:
+        return self._data.body(self._own(self.base)).xmat.reshape(3, 3)
+
+    def lowest(self, link: str) -> float | None:
+        """m: height in the base's frame of a link's lowest point; None where it has no shape."""
+        points, (pos, turn) = self.points(link), self.pose(link)
+        return None if not len(points) else float((pos[2] + points @ turn[2]).min())
+
+    @functools.cached_property
+    def lowest_point(self) -> float:
+        """m: the same of the whole robot; 0 where nothing has a shape."""
+        return min((z for z in map(self.lowest, self._links()) if z is not None), default=0.0)
+
+    def standing(self, layout: Layout) -> float:
+        """m of the base's frame above what it stands on: on the lowest point of its base and, where it drives, of its
+        wheels, wherever its arms hang."""
+        links = [self.base]
+        if layout.drives:
+            moved = {*layout.arm, *layout.gripper}
+            links += [link for link in self._links() if not self.joints_to({link}) & moved]
+        lows = [low for low in map(self.lowest, links) if low is not None]
+        if layout.drives:
+            return -min(lows, default=-self.height)
+        return max(-min(lows, default=0.0), 0.0)
+
+    def joints_to(self, links: Collection[str]) -> set[str]:
+        """Joints between the base and these links."""
+        above, found = {j.child: j for j in self._description.joints}, set()
+        for link in links:
+            while link in above:
+                found.add(above[link].name)
+                link = above[link].parent
+        return found
+
     def drive(self, layout: Layout) -> tuple[float, float, float]:
         """Radius of the wheels and distance between both sides (m), and their largest speed (rad/s)."""
         hubs = np.array([self.pose(self._description.joint(name).child)[0] for name in layout.wheels])
         left, right = hubs.reshape(2, -1, 3).mean(1)
-        radius = float(np.mean(hubs[:, 2])) + self.height
+        radius = float(np.mean(hubs[:, 2])) + self.standing(layout)
         speed = min(self._description.joint(name).speed for name in layout.wheels)
         return radius, float(np.linalg.norm(left - right)), speed
+
+    def glide(self, layout: Layout) -> tuple[float, float, float]:
+        """Largest speeds of an omnidirectional base (m/s and rad/s), and the force that drives it (N)."""
+        speed, arm, push = GLIDE_SPEED, 0.0, 0.0
+        if layout.wheels:
+            joints = [self._description.joint(name) for name in layout.wheels]
+            hubs = np.array([self.hub(joint.name) for joint in joints])
+            radius = max(float(np.mean(hubs[:, 2])) + self.standing(layout), 0.01)
+            arm = float(np.linalg.norm(hubs[:, :2] - hubs[:, :2].mean(0), axis=1).mean())
+            speed = min(GLIDE_SPEED, radius * min(joint.speed for joint in joints))
+            push = sum(joint.force for joint in joints) / radius
+        return speed, min(GLIDE_TURN, speed / max(arm, 0.1)), min(push or np.inf, self.mass * GLIDE_ACCELERATION)
+
+    @property
+    def mass(self) -> float:
+        """kg of the whole robot."""
+        return float(self._model.body_subtreemass[self._model.body(self._own(self.base)).id])
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Centre of mass [3] in the base's frame, m."""
+        base = self._model.body(self._own(self.base)).id
+        return self._base_turn.T @ (self._data.subtree_com[base] - self._data.xpos[base])
+
+    def yaw_inertia(self) -> float:
+        """kg m2 of the whole robot about the vertical through its base."""
+        total = 0.0
+        for link in self._links():
+            body = self._model.body(self._own(link)).id
+            away = self._data.xipos[body] - self._data.body(self._own(self.base)).xpos
+            turn = self._data.ximat[body].reshape(3, 3)
+            own = turn @ np.diag(self._model.body_inertia[body]) @ turn.T
+            total += float(own[2, 2] + self._model.body_mass[body] * (away[0] ** 2 + away[1] ** 2))
+        return total
 
     def wheel_signs(self, layout: Layout) -> np.ndarray:
         """1 for a wheel whose joint turns about the robot's y axis, -1 for one that turns the other way."""
@@ -201,24 +287,52 @@ class RobotBody:
         low, high = np.min(corners, 0), np.max(corners, 0)
         return (low + high) / 2, (high - low) / 2
 
-    def pose(self, link: str) -> tuple[np.ndarray, np.ndarray]:
-        """Position [3] and rotation matrix of a link that moves, in the base's frame."""
-        base, body = self._description.base, self._data.body(self._own(link))
-        turn = self._data.body(self._own(base)).xmat.reshape(3, 3).T
-        return turn @ (body.xpos - self._data.body(self._own(base)).xpos), turn @ body.xmat.reshape(3, 3)
+    def pose(self, link: str, data: mujoco.MjData | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Position [3] and rotation matrix of a link that moves, in the base's frame. data: of `posed`."""
+        data = self._data if data is None else data
+        base, body = data.body(self._own(self._description.base)), data.body(self._own(link))
+        turn = base.xmat.reshape(3, 3).T
+        return turn @ (body.xpos - base.xpos), turn @ body.xmat.reshape(3, 3)
 
-    def distance(self, one: str, other: str, positions: Mapping[str, float]) -> float:
-        """m between the centres of two links' collision geometry, joints at these positions, others at 0."""
+    def posed(self, positions: Mapping[str, float]) -> mujoco.MjData:
+        """The robot with joints at these positions, those that follow them where they put them, others at 0."""
         data, prefix = mujoco.MjData(self._model), f"{self._description.name}_"
         data.qpos[:] = self._model.qpos0
-        for name in (self._model.joint(j).name.removeprefix(prefix) for j in self._scalar):
+        for name in self._scalar_names:
             data.qpos[self._model.joint(prefix + name).qposadr[0]] = self._position(name, positions)
         mujoco.mj_kinematics(self._model, data)
-        centres = []
-        for link in (one, other):
-            body = data.body(self._own(link))
-            centres.append(body.xpos + body.xmat.reshape(3, 3) @ self.box(link)[0])
-        return float(np.linalg.norm(centres[0] - centres[1]))
+        return data
+
+    @functools.cached_property
+    def _scalar_names(self) -> list[str]:
+        prefix = f"{self._description.name}_"
+        return [self._model.joint(j).name.removeprefix(prefix) for j in self._scalar]
+
+    def points(self, link: str) -> np.ndarray:
+        """Corners [n, 3] of a link's collision geometry, in its frame, m: vertices of meshes, corners of the boxes
+        round other shapes; of spheres the ends of their axes."""
+        model, found = self._model, [np.zeros((0, 3))]
+        body = model.body(self._own(link)).id
+        for geom in np.flatnonzero((model.geom_bodyid == body) & (model.geom_contype > 0)):
+            turn = np.zeros(9)
+            mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+            mesh = int(model.geom_dataid[geom])
+            if mesh >= 0:
+                first = model.mesh_vertadr[mesh]
+                corners = np.array(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], float)
+            elif mujoco.mjtGeom(int(model.geom_type[geom])) == mujoco.mjtGeom.mjGEOM_SPHERE:
+                corners = np.concatenate([np.eye(3), -np.eye(3)]) * model.geom_size[geom, 0]
+            elif mujoco.mjtGeom(int(model.geom_type[geom])) in ROUND:
+                radius, half = model.geom_size[geom, :2]
+                if mujoco.mjtGeom(int(model.geom_type[geom])) == mujoco.mjtGeom.mjGEOM_CAPSULE:
+                    half += radius
+                around = np.arange(16) * (np.pi / 8)
+                ring = np.stack([np.cos(around) * radius, np.sin(around) * radius, np.full(16, half)], 1)
+                corners = np.concatenate([ring, ring * (1, 1, -1)])
+            else:
+                corners = SIGNS * model.geom_aabb[geom, 3:] + model.geom_aabb[geom, :3]
+            found.append(model.geom_pos[geom] + corners @ turn.reshape(3, 3).T)
+        return np.concatenate(found)
 
     def chain(self, layout: Layout, hand: str) -> Chain | None:
         """The arm's joints from the base to a hand, frames parallel at joint positions 0; None where there are none."""

@@ -1,14 +1,16 @@
-"""The controller of a URDF robot: a differential drive, each joint of the arm by its velocity, a gripper.
+"""The controller of a URDF robot: its drive, each joint of the arm by its velocity, grippers and suction.
 
 | numbers | in units of |
 |---|---|
 | forward, turn_left (where it drives) | the drive's largest speeds |
+| forward, left, turn_left (of an omnidirectional base) | the drive's largest speeds |
 | one for each joint of the arm, by its name | the joint's largest speed |
 | gripper (where it has one; of several `<hand>_gripper`) | open from 0 on, closed below |
+| `<link>_suction` for each suction cup | off from 0 on, on below |
 
 Velocities of the arm become positions of servos, which go on from the last ones and not from where the arm sags to.
 
-Axes: W worlds, J joints of the arm, G grippers, F joints of all grippers.
+Axes: W worlds, J joints of the arm, G grippers and suction cups, F joints of all grippers.
 """
 
 from __future__ import annotations
@@ -25,9 +27,9 @@ from ig2mj.agents.controllers import differential_drive, drive_limits, wheel_odo
 from ig2mj.agents.kinematics import forward
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.description import Description
-from ig2mj.agents.urdf.layout import Layout
+from ig2mj.agents.urdf.layout import OMNIDIRECTIONAL, Layout
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import length
+from ig2mj.geometry.poses import length, quat_rotate_inverse
 from ig2mj.scene.tables import SceneTables
 
 LEASH = 0.15
@@ -71,14 +73,18 @@ class UrdfController:
         def places(names: tuple[str, ...]) -> np.ndarray:
             return np.array([tables.agent_joint_names.index(f"{own}_{n}") for n in names], int)
 
-        self._wheels, self._arm, self._fingers = places(layout.wheels), places(layout.arm), places(layout.gripper)
+        glides = layout.base == OMNIDIRECTIONAL
+        self._wheels = places(() if glides else layout.wheels)
+        self._arm, self._fingers = places(layout.arm), places(layout.gripper)
         self._hands = np.flatnonzero(tables.hand_agent == agent)
         grippers = layout.grippers
         self._gripper_of = np.array(
             [next((g for g, one in enumerate(grippers) if n in one.joints), 0) for n in layout.gripper], int
         )
-        of_hand = [[body.frame(one.hand)[0] == link for link in hands] for one in grippers]
-        self._holds = np.array(of_hand, bool).reshape(len(grippers), len(hands))
+        closing = [*(one.hand for one in grippers), *layout.suction]
+        of_hand = [[body.frame(link)[0] == hand for hand in hands] for link in closing]
+        self._holds = np.array(of_hand, bool).reshape(len(closing), len(hands))
+        self._grippers = len(grippers)
         self._arm_speed = np.array([description.joint(n).speed for n in layout.arm], np.float32)
         self._leash = (LEASH + 2 * period * self._arm_speed).astype(np.float32)
         limits = np.array([body.limits(n) for n in layout.arm], np.float32).reshape(-1, 2)
@@ -90,22 +96,25 @@ class UrdfController:
         self._open = np.where(closes_low, ends[:, 1], ends[:, 0])
         self._closed = np.where(closes_low, ends[:, 0], ends[:, 1])
         self._start = np.array([body.start_of(n, layout) for n in (*layout.arm, *layout.gripper)], np.float32)
-        self._drive = body.drive(layout) if layout.wheels else None
+        self._drive = body.drive(layout) if layout.wheels and not glides else None
         self._signs, self._each_side = body.wheel_signs(layout), len(layout.wheels) // 2
+        self._glides = np.array(body.glide(layout)[:2], np.float32)[[0, 0, 1]] if glides else None
         if self._drive is not None:
             self._speeds = drive_limits(*self._drive).astype(np.float32)
         self._chains = [(body.chain(layout, link), np.array(body.chain_joints(layout, link), int)) for link in hands]
         single = len(grippers) == 1
         self.action_names: tuple[str, ...] = (
-            *(("forward", "turn_left") if self._drive else ()),
+            *(("forward", "left", "turn_left") if glides else ("forward", "turn_left") if self._drive else ()),
             *layout.arm,
             *("gripper" if single else f"{one.hand}_gripper" for one in grippers),
+            *(f"{link}_suction" for link in layout.suction),
         )
         self.action_high: np.ndarray = np.ones(len(self.action_names), np.float32)
         self.action_low: np.ndarray = -self.action_high
         moving = (*layout.arm, *layout.gripper)
         self.proprioception_names: tuple[str, ...] = (
             *(("dd_base_lin_vel", "dd_base_ang_vel") if self._drive else ()),
+            *(("base_lin_vel_x", "base_lin_vel_y", "base_ang_vel") if glides else ()),
             *(f"{name}_qpos" for name in moving),
             *(f"{name}_qvel" for name in moving),
             *("is_grasping" if len(hands) == 1 else f"{link}_is_grasping" for link in hands),
@@ -132,6 +141,9 @@ class UrdfController:
             sides = differential_drive(action[:, :2] * self._speeds, *self._drive)
             parts.append(jnp.repeat(sides, self._each_side, axis=1) * self._signs)
             first = 2
+        elif self._glides is not None:
+            parts.append(action[:, :3] * self._glides)
+            first = 3
         end = first + len(self._arm)
         now = q[:, self._arm]
         arm = jnp.clip(
@@ -145,7 +157,8 @@ class UrdfController:
             asked = jnp.where(closed[:, of], self._closed, self._open)
             frozen = jnp.where((held & ~state.held)[:, of], q[:, self._fingers], state.fingers)
             fingers = jnp.where(held[:, of], frozen, asked)
-        return jnp.concatenate([*parts, arm, fingers], axis=1), UrdfState(arm, fingers, closed, held)
+        cups = closed[:, self._grippers :].astype(jnp.float32)
+        return jnp.concatenate([*parts, arm, fingers, cups], axis=1), UrdfState(arm, fingers, closed, held)
 
     def grip(self, state: UrdfState) -> Float[Array, "W H"]:
         return (state.closed[:, :, None] & self._holds).any(1).astype(jnp.float32)
@@ -166,8 +179,8 @@ class UrdfController:
         return jnp.asarray(view.agent.eye_pos)[:, self.agent], jnp.asarray(view.agent.eye_quat)[:, self.agent]
 
     def proprioception(self, view: PhysicsView, state: UrdfState) -> Float[Array, "W m"]:
-        """Speeds of the base computed from the wheels (m/s, rad/s); positions and velocities of arm and gripper; 1 with
-        something in the hand, else -1."""
+        """Speeds of the base computed from the wheels (m/s, rad/s), of an omnidirectional one those of the base itself
+        in its own frame; positions and velocities of arm and gripper; 1 with something in the hand, else -1."""
         agent, moving = view.agent, np.concatenate([self._arm, self._fingers])
         q, speed = jnp.asarray(agent.joint_pos), jnp.asarray(agent.joint_vel)
         parts: list[Any] = []
@@ -175,6 +188,11 @@ class UrdfController:
             radius, axle, _ = self._drive
             turning = (speed[:, self._wheels] * self._signs).reshape(len(speed), 2, self._each_side)
             parts.append(wheel_odometry(turning.mean(2), radius, axle))
+        elif self._glides is not None:
+            base = jnp.asarray(agent.base_quat)[:, self.agent]
+            along = quat_rotate_inverse(base, jnp.asarray(agent.base_linvel)[:, self.agent])
+            about = quat_rotate_inverse(base, jnp.asarray(agent.base_angvel)[:, self.agent])
+            parts.append(jnp.concatenate([along[:, :2], about[:, 2:]], axis=1))
         parts += [q[:, moving], speed[:, moving]]
         holding = jnp.asarray(view.held)[:, self._hands].any(2)
         parts.append(jnp.where(holding, jnp.ones(holding.shape), -1.0))

@@ -20,7 +20,8 @@ MAX_EFFORT, MAX_SPEED, MAX_WHEEL_SPEED = 100.0, 1.0, 15.0
 class RobotJoint(msgspec.Struct, frozen=True):
     """A joint that moves. parent, child: links; type: revolute, continuous, prismatic or floating.
 
-    effort: N m or N. velocity: rad/s or m/s; 0 where the URDF gives none. mimics: the joint that it follows.
+    effort: N m or N. velocity: rad/s or m/s; 0 where the file gives none. mimics: the joint that it follows.
+    passive: the file has motors, and none for it: it is moved by what it touches or is tied to.
     """
 
     name: str
@@ -30,6 +31,7 @@ class RobotJoint(msgspec.Struct, frozen=True):
     effort: float = 0.0
     velocity: float = 0.0
     mimics: str | None = None
+    passive: bool = False
 
     @property
     def force(self) -> float:
@@ -51,13 +53,17 @@ class FrameEntry(msgspec.Struct, frozen=True):
 
 
 class Description(msgspec.Struct, frozen=True):
-    """A robot. base: its root link. joints: without fixed ones. frames: of all links, by name."""
+    """A robot. base: its root link. joints: without fixed ones. frames: of all links, by name; of MJCF also of its
+    sites and cameras. start: positions of joints (rad or m) that its file begins with.
+    omnidirectional: its file moves the base over the floor in every direction."""
 
     format_version: int
     name: str
     base: str
     joints: list[RobotJoint]
     frames: dict[str, FrameEntry]
+    start: dict[str, float] = {}
+    omnidirectional: bool = False
 
     @classmethod
     def load(cls, folder: pathlib.Path) -> Description:

@@ -1,9 +1,19 @@
-"""A URDF robot's grippers: rays between the inner faces of two fingers, and at which limits they are closed."""
+"""How a converted robot's hands hold: rays between the inner faces of fingers, and at which limits grippers are closed.
+
+A hand is one of three kinds:
+
+- A gripper with two fingers or more. Rays run from one finger to the others: to one of two, and to the two nearest
+  tips of a hand with more, from the finger that stands apart from them.
+- A gripper with one finger that closes against a part of the hand that does not move, as on many small arms.
+- A suction cup. Rays run a short way out of it.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
+import mujoco
 import numpy as np
 
 from ig2mj.agents.hand_rays import HandRays
@@ -13,16 +23,21 @@ from ig2mj.agents.urdf.layout import Gripper, Layout
 INSIDE = 0.8
 """Share of a finger's half size at which rays begin and end."""
 
-
 NEARER = 1e-3
-"""m by which two fingers are nearer to each other at one limit of a joint, so that it counts as the closed one."""
+"""m by which fingers are nearer to each other at one limit of a joint, so that it counts as the closed one."""
+
+OPPOSITE = 2
+"""Most fingers that another one closes against."""
+
+CUP, SUCTION_REACH = 0.006, 0.03
+"""m: half the distance between the rays of a suction cup, and how far they lead out of it."""
 
 
 def with_closed_limits(body: RobotBody, layout: Layout) -> Layout:
     """The layout with the limit at which each gripper is closed, where it does not say so.
 
-    That of two fingers which are nearer to each other there; the lower one where there are no two, or where it makes no
-    difference.
+    That at which its fingers are nearer to each other, or to the hand where there is just one; the lower one where it
+    makes no difference.
     """
     if layout.several:
         return dataclasses.replace(layout, several=tuple(_with_closed_limit(body, one) for one in layout.several))
@@ -35,65 +50,147 @@ def with_closed_limits(body: RobotBody, layout: Layout) -> Layout:
 def _with_closed_limit(body: RobotBody, gripper: Gripper) -> Gripper:
     if gripper.closed:
         return gripper
-    pair = _facing(body, gripper) if len(_tips(body, gripper)) == 2 else None
-    high = [] if pair is None else [name for name in gripper.joints if _closes_high(body, gripper, name, pair)]
+    high = [name for name in gripper.joints if _closes_high(body, gripper, name)]
     if len(high) == len(gripper.joints):
         return dataclasses.replace(gripper, closed="upper")
     return dataclasses.replace(gripper, closed="lower", reversed=tuple(high))
 
 
-def _closes_high(body: RobotBody, gripper: Gripper, joint: str, pair: tuple[str, str]) -> bool:
-    """Two fingers are nearer to each other at a joint's upper limit, the other joints half way."""
-    half = {name: sum(body.limits(name)) / 2 for name in gripper.joints}
-    at_lower, at_upper = (body.distance(*pair, half | {joint: limit}) for limit in body.limits(joint))
+def _closes_high(body: RobotBody, gripper: Gripper, joint: str) -> bool:
+    """Fingers are nearer to each other at a joint's upper limit, the other joints half way."""
+    half = _half_way(body, gripper)
+    at_lower, at_upper = (_opening(body, gripper, body.posed(half | {joint: limit})) for limit in body.limits(joint))
     return at_upper < at_lower - NEARER
 
 
+def _half_way(body: RobotBody, gripper: Gripper) -> dict[str, float]:
+    return {name: sum(body.limits(name)) / 2 for name in gripper.joints}
+
+
+def _opening(body: RobotBody, gripper: Gripper, data: mujoco.MjData) -> float:
+    """m: mean distance between the fingers' middles; of a single finger, between its tip and the hand."""
+    tips = finger_tips(body, gripper)
+    if len(tips) == 1:
+        tip = _to_base(body, tips[0], _outermost(body, tips[0])[None], data)
+        return float(np.linalg.norm(_to_base(body, *_palm_points(body, gripper), data) - tip, axis=1).min())
+    middles = [_to_base(body, tip, body.box(tip)[0][None], data)[0] for tip in tips]
+    apart = [float(np.linalg.norm(a - b)) for a, b in itertools.combinations(middles, 2)]
+    return float(np.mean(apart)) if apart else 0.0
+
+
+def _outermost(body: RobotBody, finger: str) -> np.ndarray:
+    """The point [3] of a finger that is farthest from its joint, in its frame."""
+    points = body.points(finger)
+    return points[np.argmax(np.linalg.norm(points, axis=1))]
+
+
+def _palm_points(body: RobotBody, gripper: Gripper) -> tuple[str, np.ndarray]:
+    """The link that moves a hand, and its points."""
+    hand = body.frame(gripper.hand)[0]
+    points = body.points(hand)
+    return hand, points if len(points) else np.zeros((1, 3))
+
+
+def _to_base(body: RobotBody, link: str, points: np.ndarray, data: mujoco.MjData) -> np.ndarray:
+    """Points [n, 3] of a link in the base's frame."""
+    pos, turn = body.pose(link, data)
+    return pos + points @ turn.T
+
+
+def hand_rays(name: str, body: RobotBody, layout: Layout) -> tuple[HandRays, ...]:
+    """Of all hands that can hold something: of grippers, then of suction; each palm's once. name: of the agent."""
+    found = [gripper_rays(name, body, gripper) for gripper in layout.grippers]
+    found += [suction_rays(name, body, link) for link in layout.suction]
+    return tuple({hand.palm: hand for hand in found if hand is not None}.values())
+
+
 def gripper_rays(name: str, body: RobotBody, gripper: Gripper) -> HandRays | None:
-    """Sixteen rays, as iGibson's of Fetch: four corners of each finger's inner face; none with fewer than two fingers.
+    """Four corners of each finger's inner face, as iGibson's of Fetch; None where no finger has a shape.
 
     name: of the agent.
     """
-    pair = _facing(body, gripper)
-    if pair is None:
+    tips = finger_tips(body, gripper)
+    if not tips:
         return None
-    one, other = pair
     hand = body.frame(gripper.hand)[0]
-    ends = {link: (body.pose(link), body.box(link)) for link in (one, other)}
-    middle = {link: pose[0] + pose[1] @ box[0] for link, (pose, box) in ends.items()}
-    corners = {}
-    for link, towards in ((one, other), (other, one)):
-        (_, turn), (centre, half) = ends[link]
-        inward = turn.T @ (middle[towards] - middle[link])
-        across = int(np.argmax(np.abs(inward)))
-        spots = []
-        for first in (-INSIDE, INSIDE):
-            for second in (-INSIDE, INSIDE):
-                spot, sides = centre.copy(), [k for k in range(3) if k != across]
-                spot[across] += np.sign(inward[across]) * half[across]
-                spot[sides[0]] += first * half[sides[0]]
-                spot[sides[1]] += second * half[sides[1]]
-                spots.append(spot)
-        corners[link] = np.array(spots)
-    palm_pos, palm_turn = body.pose(hand)
-    between = palm_turn.T @ ((middle[one] + middle[other]) / 2 - palm_pos)
+    data = body.posed(_half_way(body, gripper))
+    if len(tips) == 1:
+        one, starts, others = tips[0], *_against_palm(body, gripper, tips[0], data)
+    else:
+        one, opposite = _opposed(body, tips, data)
+        middles = {tip: _to_base(body, tip, body.box(tip)[0][None], data)[0] for tip in tips}
+        towards = np.mean([middles[other] for other in opposite], axis=0)
+        starts = _face(body, one, towards - middles[one], data)
+        others = [(other, _face(body, other, middles[one] - middles[other], data)) for other in opposite]
+    ends = np.concatenate([points for _, points in others])
+    inner = [_to_base(body, one, starts, data).mean(0), np.mean([_to_base(body, *o, data).mean(0) for o in others], 0)]
+    palm_pos, palm_turn = body.pose(hand, data)
     return HandRays(
         palm=_named(name, body, hand),
-        grasp_point=between,
-        start_bodies=(_named(name, body, one),) * 4,
-        starts=corners[one],
-        end_bodies=(_named(name, body, other),) * 4,
-        ends=corners[other],
+        grasp_point=palm_turn.T @ (np.mean(inner, axis=0) - palm_pos),
+        start_bodies=(_named(name, body, one),) * len(starts),
+        starts=starts,
+        end_bodies=tuple(_named(name, body, other) for other, points in others for _ in points),
+        ends=ends,
     )
 
 
-def _facing(body: RobotBody, gripper: Gripper) -> tuple[str, str] | None:
-    """Two fingers between which something is held: the tips of the first two that hang on the hand."""
-    pair = _tips(body, gripper)[:2]
-    return (pair[0], pair[1]) if len(pair) == 2 else None
+def _opposed(body: RobotBody, tips: list[str], data: mujoco.MjData) -> tuple[str, list[str]]:
+    """The finger that stands apart from the others, and the two nearest to it of those; the first of two."""
+    middles = {tip: _to_base(body, tip, body.box(tip)[0][None], data)[0] for tip in tips}
+    apart = {t: sum(float(np.linalg.norm(middles[t] - middles[o])) for o in tips) for t in tips}
+    one = max(tips, key=lambda tip: ("thumb" in tip.lower(), round(apart[tip], 6))) if len(tips) > 2 else tips[0]
+    others = sorted((t for t in tips if t != one), key=lambda t: float(np.linalg.norm(middles[t] - middles[one])))
+    return one, others[:OPPOSITE]
 
 
-def _tips(body: RobotBody, gripper: Gripper) -> list[str]:
+def _face(body: RobotBody, link: str, inward: np.ndarray, data: mujoco.MjData) -> np.ndarray:
+    """Four points [4, 3] on the side of a finger's box that faces `inward` (base's frame), in the finger's frame."""
+    centre, half = body.box(link)
+    local = body.pose(link, data)[1].T @ inward
+    across = int(np.argmax(np.abs(local)))
+    sides = [k for k in range(3) if k != across]
+    spots = []
+    for first, second in itertools.product((-INSIDE, INSIDE), repeat=2):
+        spot = centre.copy()
+        spot[across] += np.sign(local[across]) * half[across]
+        spot[sides[0]] += first * half[sides[0]]
+        spot[sides[1]] += second * half[sides[1]]
+        spots.append(spot)
+    return np.array(spots)
+
+
+def _against_palm(
+    body: RobotBody, gripper: Gripper, finger: str, data: mujoco.MjData
+) -> tuple[np.ndarray, list[tuple[str, np.ndarray]]]:
+    """Points of the only finger, in its frame, and points of the hand that they meet when it closes."""
+    closed = body.posed({n: body.limits(n)[0 if gripper.closes_low(n) else 1] for n in gripper.joints})
+    hand, palm = _palm_points(body, gripper)
+    own = body.points(finger)
+    outer = own[np.argsort(-np.linalg.norm(own, axis=1))]
+    starts = np.array([outer[0] * share for share in (0.95, 0.8, 0.65, 0.5)])
+    there = _to_base(body, hand, palm, closed)
+    ends = [palm[np.argmin(np.linalg.norm(there - p, axis=1))] for p in _to_base(body, finger, starts, closed)]
+    return starts, [(hand, np.array(ends))]
+
+
+def suction_rays(name: str, body: RobotBody, link: str) -> HandRays:
+    """Out of a suction cup. name: of the agent."""
+    palm, pos, quat = body.frame(link)
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, quat)
+    axes = turn.reshape(3, 3).T
+    signed = np.concatenate([axes[[2, 0, 1]], -axes[[2, 0, 1]]])  # z before x and y, where it is open
+    outward = pos / max(float(np.linalg.norm(pos)), 1e-9)
+    axis = signed[int(np.argmax(np.round(signed @ outward, 3)))]
+    side = axes[int(np.argmin(np.abs(axes @ axis)))]
+    other = np.cross(axis, side)
+    spots = np.array([pos + CUP * (a * side + b * other) for a, b in itertools.product((-1, 1), repeat=2)])
+    body_name = _named(name, body, palm)
+    return HandRays(body_name, pos, (body_name,) * 4, spots, (body_name,) * 4, spots + SUCTION_REACH * axis)
+
+
+def finger_tips(body: RobotBody, gripper: Gripper) -> list[str]:
     """The last link with a shape of each finger, in the order of the file's.
 
     Where branches of a hand have different numbers of links, fingers are those with the most: the others guide them, as

@@ -1,13 +1,13 @@
-"""`UrdfRobot`: a robot of one's own in a scene.
+"""`UrdfRobot`: a robot of one's own in a scene, from a URDF or an MJCF file.
 
     from ig2mj_converters.convert_robot import convert_robot
 
     convert_robot("my_robot.urdf", "my_robot")                       # once; or: ig2mj convert robot
-    env = ig2mj.make("PointNavigation", robot=UrdfRobot.load("my_robot"))
+    env = ig2mj.make("PointNavigation", robot="my_robot")            # the folder
 
-Bodies, shapes and masses are those of the URDF. Every motor is a servo with the URDF's limits of force and speed;
+Bodies, shapes and masses are those of the file. Every motor is a servo with the file's limits of force and speed;
 gravity is compensated but for the base, as robots' own controllers do it, and links of the robot do not collide with
-each other.
+each other. An omnidirectional base glides on wheels without friction, pushed by three velocity servos in its own frame.
 """
 
 from __future__ import annotations
@@ -24,13 +24,26 @@ import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.hand_rays import HandRays
-from ig2mj.agents.parts import Vector, exclude_all, extend_keyframes, multiply, normalized, servo
+from ig2mj.agents.parts import (
+    GEOM,
+    Vector,
+    collision,
+    exclude_all,
+    extend_keyframes,
+    material,
+    multiply,
+    normalized,
+    servo,
+    visual,
+)
 from ig2mj.agents.task_robot import TaskRobot
+from ig2mj.agents.urdf.assignment import find_layout
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.controller import UrdfController
-from ig2mj.agents.urdf.description import Description
-from ig2mj.agents.urdf.grip import gripper_rays, with_closed_limits
-from ig2mj.agents.urdf.layout import Layout
+from ig2mj.agents.urdf.description import ROBOT_FILE, Description
+from ig2mj.agents.urdf.grip import hand_rays, with_closed_limits
+from ig2mj.agents.urdf.layout import OMNIDIRECTIONAL, Layout
+from ig2mj.agents.urdf.layout_file import read_entries
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
 
@@ -56,8 +69,26 @@ FRICTION = 1.0
 FIELD_OF_VIEW = 90.0
 """Degrees, vertical."""
 
-FROM_LINK = (0.5, 0.5, -0.5, -0.5)
-"""From a camera's link (x forward, z up) to MuJoCo's camera frame."""
+FROM_LINK, FROM_OPTICAL = (0.5, 0.5, -0.5, -0.5), (0.0, 1.0, 0.0, 0.0)
+"""From a camera's link (x forward, z up), and from its optical frame (z forward, y down), to MuJoCo's camera frame."""
+
+OPTICAL = "optical"
+"""In the name of a link whose z axis points forward."""
+
+LAYOUT_FILES = ("layout.toml", "layout.json")
+"""In a converted robot's folder: what corrects its layout."""
+
+GLIDE_RATE = 10.0
+"""1/s: how fast an omnidirectional base reaches the speed that it is to have."""
+
+SUCTION_FORCE = 40.0
+"""N with which a suction cup of 4 cm across holds at a fifth of an atmosphere less than outside."""
+
+SHOULDER_HEIGHT = 0.8
+"""m above the floor of an arm's first joint in activities: furniture is 0.4 to 0.95 m high."""
+
+PEDESTAL = (0.06, 0.25)
+"""m: least and largest half width of a pedestal."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,7 +97,7 @@ class UrdfRobot(TaskRobot):
 
     Attributes:
       folder: what the converter wrote. name: of the agent; the converted robot's, or another.
-      description, layout: what it is. pos, quat: of its base; z is the floor that it stands on.
+      description, layout: what it is. pos, quat: of its base; z is the floor that it, or its pedestal, stands on.
       compiled: `body`, where it is compiled already.
     """
 
@@ -90,22 +121,25 @@ class UrdfRobot(TaskRobot):
         """A converted robot.
 
         Args:
-          layout: file, or entries as in one (`ig2mj.agents.urdf.layout`); None: found from names of joints.
+          layout: file, or entries as in one (`ig2mj.agents.urdf.layout`); None: the folder's own `layout.toml`, and
+            what that does not say is found (`ig2mj.agents.urdf.assignment`).
           name: of the agent; None: the robot's.
 
         Raises:
-          InputError: a file is missing or broken. UnknownNameError: the layout names what the robot does not have.
+          InputError: a file is missing or broken, or the robot has legs. UnknownNameError: the layout names what the
+            robot does not have.
         """
         path = pathlib.Path(folder)
         description = Description.load(path)
-        if layout is None or isinstance(layout, Mapping):
-            found = Layout.found(description, layout)
-        else:
-            found = Layout.load(description, layout)
-        robot = cls(path, name or description.name, description, found)
-        body = robot.body
+        if layout is None:
+            layout = own_layout(path)
+        given, where = (layout, "layout") if layout is None or isinstance(layout, Mapping) else (None, str(layout))
+        if layout is not None and given is None:
+            given = read_entries(layout)
+        body = RobotBody(path, description)
+        found = find_layout(description, body, given, where)
         body.check(found)
-        return dataclasses.replace(robot, layout=with_closed_limits(body, found), compiled=body)
+        return cls(path, name or description.name, description, with_closed_limits(body, found), compiled=body)
 
     @functools.cached_property
     def body(self) -> RobotBody:
@@ -115,23 +149,37 @@ class UrdfRobot(TaskRobot):
     @property
     def drives(self) -> bool:
         """It can go somewhere."""
-        return self.layout.base == "differential"
+        return self.layout.drives
 
     @property
     def hand_count(self) -> int:
         return len(self.layout.hands)
 
+    def for_activity(self, *, drives: bool, camera_tilt: float | None, camera_pan: float) -> UrdfRobot:
+        """An arm that is bolted down, and has no `mount` of its own, stands on a pedestal that brings its first joint
+        to `SHOULDER_HEIGHT`."""
+        if self.drives or self.layout.mount is not None or not self.layout.arm:
+            return self
+        shoulder = min(self.body.hub(name)[2] for name in self.layout.arm) + self.body.standing(self.layout)
+        mount = round(max(SHOULDER_HEIGHT - shoulder, 0.0), 3)
+        return dataclasses.replace(self, layout=dataclasses.replace(self.layout, mount=mount))
+
     def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
         pos = np.array(self.pos if pos is None else pos, np.float64)
-        pos[2] += self.body.height
+        standing, mount = self.body.standing(self.layout), 0.0 if self.drives else self.layout.mount or 0.0
+        pos[2] += standing + mount
         quat, layout = normalized(self.quat if quat is None else quat), self.layout
         bodies = self.body.add_to(spec, self.name, pos, quat, fixed=not self.drives, layout=layout)
-        fingers = [link for gripper in layout.grippers for link in self.body.fingers(gripper)]
+        fingers = self._fingers
         for link, body in bodies.items():
             body.gravcomp = 0.0 if link == self.description.base or link in self._rolling else 1.0
             if link in self._rolling or link in fingers:
                 for geom in body.geoms:
-                    geom.friction[0] = FRICTION
+                    geom.friction[0] = max(float(geom.friction[0]), FRICTION)
+                    if layout.base == OMNIDIRECTIONAL and link in self._rolling:
+                        geom.condim, geom.priority = 1, 1
+        if mount:
+            self._add_pedestal(spec, bodies[self.description.base], standing, mount)
         exclude_all(spec, [body.name for body in bodies.values()])
         for joint in self.description.joints:
             self._tune(spec.joint(f"{self.name}_{joint.name}"), joint.name)
@@ -143,8 +191,9 @@ class UrdfRobot(TaskRobot):
         if layout.camera is not None:
             camera = f"{self.name}/eye"
             link, place, turn = self.body.frame(layout.camera)
+            forward = FROM_OPTICAL if OPTICAL in layout.camera.lower() else FROM_LINK
             bodies[link].add_camera(
-                name=camera, pos=list(place), quat=list(multiply(turn, FROM_LINK)), fovy=FIELD_OF_VIEW
+                name=camera, pos=list(place), quat=list(multiply(turn, forward)), fovy=FIELD_OF_VIEW
             )
         laser = None
         if layout.laser is not None and frames[layout.laser].on == self.description.base:
@@ -161,34 +210,99 @@ class UrdfRobot(TaskRobot):
 
     @property
     def holding(self) -> tuple[str, ...]:
-        """Links that hold something, as the scene numbers them: those of grippers with two fingers, else all hands."""
-        frames = self.description.frames
-        gripping = [g.hand for g in self.layout.grippers if gripper_rays(self.name, self.body, g) is not None]
-        return tuple(dict.fromkeys(frames[link].on for link in gripping or self.layout.hands))
+        """Links that hold something, as the scene numbers them: those with rays, else all hands."""
+        frames, palms = self.description.frames, {hand.palm for hand in self.hand_rays()}
+        named = [(frames[link].on, self._body_name(frames[link].on)) for link in self.layout.hands]
+        holding = [link for link, body in named if body in palms]
+        return tuple(dict.fromkeys(holding or [link for link, _ in named]))
+
+    def _body_name(self, link: str) -> str:
+        return self.name if link == self.description.base else f"{self.name}_{link}"
+
+    @property
+    def _fingers(self) -> list[str]:
+        """Links that press on what a hand holds: fingers, the fixed jaw of a gripper with one, palms of suction."""
+        body, found = self.body, []
+        for gripper in self.layout.grippers:
+            links = body.fingers(gripper)
+            found += [*links, *([body.frame(gripper.hand)[0]] if sum(map(body.has_shape, links)) == 1 else [])]
+        found += [body.frame(link)[0] for link in self.layout.suction]
+        return list(dict.fromkeys(found))
 
     @property
     def _rolling(self) -> list[str]:
         """Links that roll on the floor."""
         joints = self.description.joints
-        return [j.child for j in joints if j.type == "continuous" and j.name not in self.layout.arm]
+        named = [self.description.joint(name).child for name in self.layout.wheels]
+        turning = [j.child for j in joints if j.type == "continuous" and j.name not in self.layout.arm]
+        return list(dict.fromkeys((*named, *turning)))
+
+    def _add_pedestal(self, spec: mujoco.MjSpec, base: mujoco.MjsBody, standing: float, mount: float) -> None:
+        """A box from the floor to the underside of a base that is bolted to it."""
+        centre, half = self.body.box(self.description.base)
+        wide = float(np.clip(max(half[:2]), *PEDESTAL))
+        size, pos = (wide, wide, mount / 2), (float(centre[0]), float(centre[1]), -standing - mount / 2)
+        collision(base, GEOM.mjGEOM_BOX, size, 0.0, pos)
+        visual(base, GEOM.mjGEOM_BOX, size, material(spec, f"{self.name}/pedestal", (0.32, 0.34, 0.37)), pos)
 
     def _tune(self, joint: mujoco.MjsJoint, name: str) -> None:
-        """Friction and rotor of a joint: the converter's are those of doors and drawers."""
+        """Friction and rotor of a joint: the converter's are those of doors and drawers. Passive joints keep theirs."""
+        if self.description.joint(name).passive:
+            return
         joint.frictionloss, joint.damping[:] = 0.0, 0.0
         if name in self.layout.arm:
             joint.armature = ROTOR_SHARE * self.body.moved(name)
         elif name in self.layout.gripper:
             joint.armature = max(self._gains(name)[0] / GRIP_RATE**2 - self.body.moved(name), 0.0)
-        elif name in self.layout.wheels:
+        elif name in self.layout.wheels and self.layout.base != OMNIDIRECTIONAL:
             joint.armature = self._gains(name)[1] / WHEEL_RATE
 
     def _add_servos(self, spec: mujoco.MjSpec) -> list[float]:
-        """Servos of wheels, arm and gripper, in this order; their controls at the start."""
-        controls = []
-        for name in (*self.layout.wheels, *self.layout.arm, *self.layout.gripper):
+        """Servos of the base or its wheels, of arm, gripper and suction, in this order; their controls at the start."""
+        controls, layout = [], self.layout
+        if layout.base == OMNIDIRECTIONAL:
+            controls += self._add_glide(spec)
+        for name in (*(layout.wheels if layout.base != OMNIDIRECTIONAL else ()), *layout.arm, *layout.gripper):
             servo(spec, f"{self.name}_{name}", *self._gains(name), self.description.joint(name).force)
-            controls.append(0.0 if name in self.layout.wheels else self.body.start_of(name, self.layout))
+            controls.append(0.0 if name in layout.wheels else self.body.start_of(name, layout))
+        for link in layout.suction:
+            added = spec.add_actuator(
+                name=f"{self.name}_{link}_suction",
+                target=self._body_name(self.body.frame(link)[0]),
+                trntype=mujoco.mjtTrn.mjTRN_BODY,
+                gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+                ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+                ctrlrange=[0.0, 1.0],
+            )
+            added.gainprm[0] = SUCTION_FORCE
+            controls.append(0.0)
         return controls
+
+    def _add_glide(self, spec: mujoco.MjSpec) -> list[float]:
+        """Velocity servos of the base, forwards, to the left and about the vertical, in its own frame."""
+        base, centre = spec.body(self.name), self.body.centre
+        site = f"{self.name}/glide"
+        base.add_site(name=site, pos=[0.0, 0.0, float(centre[2])], rgba=[0.0] * 4, size=[1e-3] * 3)
+        speed, turn, force = self.body.glide(self.layout)
+        for axis, name, inertia, most in (
+            (0, "forward", self.body.mass, force),
+            (1, "left", self.body.mass, force),
+            (5, "turn_left", self.body.yaw_inertia(), force * speed / turn),
+        ):
+            gain = inertia * GLIDE_RATE
+            added = spec.add_actuator(
+                name=f"{site}_{name}",
+                target=site,
+                trntype=mujoco.mjtTrn.mjTRN_SITE,
+                gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+                biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+                forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+                forcerange=[-most, most],
+            )
+            added.gainprm[0], added.biasprm[2] = gain, -gain
+            added.gear[:] = 0.0
+            added.gear[axis] = 1.0
+        return [0.0, 0.0, 0.0]
 
     def _gains(self, name: str) -> tuple[float, float]:
         """Stiffness and damping of a joint's servo."""
@@ -203,9 +317,18 @@ class UrdfRobot(TaskRobot):
         return moved * SERVO_RATE**2, 2 * moved * SERVO_RATE
 
     def hand_rays(self) -> tuple[HandRays, ...]:
-        """Of each gripper from corners of one finger to corners of another; none of one with fewer than two fingers."""
-        rays = [gripper_rays(self.name, self.body, gripper) for gripper in self.layout.grippers]
-        return tuple({hand.palm: hand for hand in rays if hand is not None}.values())
+        """See `ig2mj.agents.urdf.grip`; in the order of `holding`."""
+        return hand_rays(self.name, self.body, self.layout)
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> UrdfController:
         return UrdfController(tables, agent, period, self.description, self.layout, self.body, self.holding)
+
+
+def own_layout(folder: pathlib.Path) -> pathlib.Path | None:
+    """The file in a converted robot's folder that corrects its layout."""
+    return next((file for name in LAYOUT_FILES if (file := folder / name).is_file()), None)
+
+
+def is_robot_folder(value: str | os.PathLike) -> bool:
+    """A folder that `ig2mj convert robot` wrote."""
+    return (pathlib.Path(value) / ROBOT_FILE).is_file()
