@@ -206,14 +206,19 @@ def _words(name: str) -> set[str]:
     return {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)}
 
 
-def _grips(joint: RobotJoint) -> bool:
-    """It opens and closes a gripper, and does not turn without end."""
-    return joint.type != "continuous" and (_named(joint.name, GRIPS) or _named(joint.child, GRIPS))
+def _grips(robot: Description, joint: RobotJoint) -> bool:
+    """It opens and closes a gripper, and does not turn without end. A joint that is not named so, and carries one that
+    is, turns the whole gripper."""
+    if joint.type == "continuous" or not _named(joint.child, GRIPS):
+        return joint.type != "continuous" and _named(joint.name, GRIPS)
+    if _named(joint.name, GRIPS):
+        return True
+    return not any(other.parent == joint.child and _named(other.name, GRIPS) for other in robot.joints)
 
 
 def _gripping(robot: Description, free: Sequence[RobotJoint]) -> list[RobotJoint]:
     """Joints of grippers: by their names, and those at the ends of arms whose joints have no such names."""
-    named = [joint for joint in free if _grips(joint)]
+    named = [joint for joint in free if _grips(robot, joint)]
     hands = {hand_of(robot, joint.name, {j.name for j in named}) for joint in named}
     below: dict[str, list[RobotJoint]] = {}
     for joint in robot.joints:
@@ -247,7 +252,7 @@ def _gripping(robot: Description, free: Sequence[RobotJoint]) -> list[RobotJoint
 def _gripper(robot: Description, free: Sequence[RobotJoint], given: Mapping[str, Any]) -> list[str]:
     """Joints of the only gripper."""
     taken = set(given.get("arm", ()))
-    named = [joint.name for joint in free if _grips(joint)]
+    named = [joint.name for joint in free if _grips(robot, joint)]
     return named or [joint.name for joint in _gripping(robot, free) if joint.name not in taken]
 
 

@@ -287,7 +287,7 @@ class RobotBody:
         low, high = np.min(corners, 0), np.max(corners, 0)
         return (low + high) / 2, (high - low) / 2
 
-    def pose(self, link: str, data: mujoco.MjData | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def pose(self, link: str, data: Any = None) -> tuple[np.ndarray, np.ndarray]:
         """Position [3] and rotation matrix of a link that moves, in the base's frame. data: of `posed`."""
         data = self._data if data is None else data
         base, body = data.body(self._own(self._description.base)), data.body(self._own(link))

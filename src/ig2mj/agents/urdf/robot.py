@@ -133,9 +133,10 @@ class UrdfRobot(TaskRobot):
         description = Description.load(path)
         if layout is None:
             layout = own_layout(path)
-        given, where = (layout, "layout") if layout is None or isinstance(layout, Mapping) else (None, str(layout))
-        if layout is not None and given is None:
-            given = read_entries(layout)
+        if layout is None or isinstance(layout, Mapping):
+            given, where = layout, "layout"
+        else:
+            given, where = read_entries(layout), str(layout)
         body = RobotBody(path, description)
         found = find_layout(description, body, given, where)
         body.check(found)
