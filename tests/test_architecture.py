@@ -63,6 +63,7 @@ CONVERTER_LAYERS = [
     "convert_object",
     "convert_scene",
     "conversion",
+    "convert_mjcf_robot",
     "convert_robot",
 ]
 MOST_LINES, MOST_COLLABORATORS = 600, 32
@@ -85,6 +86,7 @@ GUESTS = {
     "converters": (
         "ig2mj.knowledge",
         "ig2mj.scene.manifest",
+        "ig2mj.scene.mjcf_files",
         "ig2mj.errors",
         "ig2mj.install_hint",
         "ig2mj.files",
