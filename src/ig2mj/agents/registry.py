@@ -2,10 +2,14 @@
 
 ig2mj.agents.register("rover", lambda: UrdfRobot.load("rover"))
 env = ig2mj.make("PointNavigation", robot="rover")
+
+A folder that `ig2mj convert robot` wrote takes the place of a name: `robot="robots/rover"`.
 """
 
 from __future__ import annotations
 
+import os
+import pathlib
 import pkgutil
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -40,19 +44,59 @@ def register(name: str, make: Callable[[], TaskRobot]) -> None:
     ROBOTS[name] = make
 
 
-def make_robot(name: str) -> TaskRobot:
-    """The robot of a name, at its own start.
+def is_robot_folder(value: str | os.PathLike) -> bool:
+    """A folder that `ig2mj convert robot` wrote."""
+    return (pathlib.Path(value) / "robot.json").is_file()
+
+
+def check_robot(value: str) -> None:
+    """Raises EngineError or UnknownNameError where a text is neither a robot's name nor its folder."""
+    if value in ROBOTS or is_robot_folder(value):
+        return
+    file = pathlib.Path(value)
+    for ending, option in ((".urdf", "--robot-urdf"), (".xml", "--robot-mjcf"), (".mjcf", "--robot-mjcf")):
+        if file.suffix.lower() == ending:
+            fix = f"in Python UrdfRobot.load('{value}'), on the command line {option} {value}"
+            if option == "--robot-mjcf":
+                fix = f"`ig2mj convert robot` makes a folder of it, on the command line {option} {value}"
+            raise EngineError(f"robot '{value}' is a file, not a name: {fix}")
+    if file.is_dir() or file.name != value:
+        problem = f"robot '{value}' is neither a name ({', '.join(ROBOTS)}) nor a folder with robot.json"
+        raise EngineError(f"{problem}: `ig2mj convert robot` writes such folders")
+    raise UnknownNameError("robot", value, ROBOTS, also="a folder that `ig2mj convert robot` wrote is one, too")
+
+
+def find_robot(robot: str | TaskRobot) -> tuple[str, TaskRobot]:
+    """A robot and its name. robot: a name of the registry, a folder of a converted robot, or the robot itself.
 
     Raises:
-      UnknownNameError: no such robot. EngineError: what is registered makes something else.
+      As `make_robot`.
+    """
+    if not isinstance(robot, str):
+        return robot.name, robot
+    body = make_robot(robot)
+    return (body.name if is_robot_folder(robot) else robot), body
+
+
+def robot_name(value: str) -> str:
+    """The name that a robot of the registry, or the one of a folder, has in environments."""
+    return find_robot(value)[0] if is_robot_folder(value) else value
+
+
+def make_robot(name: str) -> TaskRobot:
+    """The robot of a name, or of a folder that `ig2mj convert robot` wrote, at its own start.
+
+    Raises:
+      UnknownNameError: no such robot. EngineError: what is registered makes something else. InputError: the folder is
+        broken, or its robot has legs.
     """
     from ig2mj.agents.task_robot import TaskRobot
 
-    if name not in ROBOTS and name.lower().endswith(".urdf"):
-        fix = f"in Python UrdfRobot.load('{name}'), on the command line --robot-urdf {name}"
-        raise EngineError(f"robot '{name}' is a file, not a name: {fix}")
-    if name not in ROBOTS:
-        raise UnknownNameError("robot", name, ROBOTS)
+    check_robot(name)
+    if is_robot_folder(name):
+        from ig2mj.agents.urdf.robot import UrdfRobot
+
+        return UrdfRobot.load(name)
     registered = ROBOTS[name]
     robot = (pkgutil.resolve_name(registered) if isinstance(registered, str) else registered)()
     if not isinstance(robot, TaskRobot):

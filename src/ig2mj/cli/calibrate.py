@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
+
 
 def run(
     scenes: Annotated[tuple[pathlib.Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SCENE...")] = (),
@@ -17,7 +19,8 @@ def run(
     seed: int = 0,
     safety: float = 0.0,
     hand: bool = True,
-    robot: str = "hand",
+    robot: str | None = None,
+    own: Own = NONE,
     out: pathlib.Path | None = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
@@ -31,8 +34,8 @@ def run(
       seed: random seed of the disturbance.
       safety: factor applied to all sizes; 0: 1 for warp, 1.4 for native.
       hand: let a floating hand push objects around.
-      robot: what disturbs the scene: hand (it pushes objects), or a robot that acts at random: {robots}. The profile
-        is named after it.
+      robot: what disturbs the scene: hand (it pushes objects; the default), or a robot that acts at random: {robots},
+        or a folder that `ig2mj convert robot` wrote. The profile is named after it.
       out: write profiles to OUT/<scene's name>/ instead of next to the manifests.
       json: print the profiles as JSON, by scene.
     """
@@ -46,9 +49,10 @@ def run(
     from ig2mj.cli.common.printing import add_bar, print_json, progress_bar, stdout_console
     from ig2mj.engine.warp.profile import profile_file, save_profile
 
+    chosen = choose_robot(robot, own) or "hand"
     profiles = {}
     for scene in scenes:
-        loaded, reach = _with_hand(scene, hand) if robot == "hand" else (_with_robot(scene, robot), None)
+        loaded, reach = _with_hand(scene, hand) if chosen == "hand" else (_with_robot(scene, chosen), None)
         with progress_bar() as bar:
             report = add_bar(bar, f"disturbing {loaded.name}")
             profile = calibrate(

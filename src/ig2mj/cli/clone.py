@@ -24,6 +24,7 @@ def train_from_demos(
 
     import jax
 
+    from ig2mj.agents.registry import robot_name
     from ig2mj.envs.names import short_name
     from ig2mj.errors import Ig2mjError, InputError
     from ig2mj.learn.bc import BC, clone
@@ -38,7 +39,7 @@ def train_from_demos(
     world, spaces = about(demos)
     for name, wanted in (
         ("task", short_name(chosen.env) or chosen.env),
-        ("robot", chosen.robot),
+        ("robot", None if chosen.robot is None else robot_name(chosen.robot)),
         ("grasping", chosen.grasping),
     ):
         if wanted is not None and world[name] != wanted:

@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 
 from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
+from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 from ig2mj.cli.demos_folder import metrics
 from ig2mj.cli.demos_replay import export, replay
 
@@ -17,6 +18,7 @@ def collect(
     out: pathlib.Path,
     episodes: int = 256,
     robot: str | None = None,
+    own: Own = NONE,
     grasping: str | None = None,
     obs: str = "state",
     engine: str = "native",
@@ -38,7 +40,7 @@ def collect(
       env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
       out: output file.
       episodes: number of successful episodes to collect.
-      robot: {robots}; default: the task's first robot.
+      robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first robot.
       grasping: mitten, assisted, sticky or physical; default: the task's.
       obs: observations to record: state, or rgbd for images as well. Others can be computed by a replay.
       engine: native, warp or jax.
@@ -73,6 +75,7 @@ def collect(
         raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
     require_module("h5py")
     check_output(out)
+    robot = choose_robot(robot, own)
     where = where_of(jobs, cluster, resume)
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
     settings = {

@@ -9,6 +9,7 @@ import tyro
 
 from ig2mj.cli.common.deprecated import renamed_options
 from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
+from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 
 WORLDS = {"native": 8}
 """So many worlds unless another number is asked for; on the others as many as episodes, up to `PURE_WORLDS`."""
@@ -24,6 +25,7 @@ def run(
     engine: str | None = None,
     worlds: int = 0,
     robot: str | None = None,
+    own: Own = NONE,
     grasping: str | None = None,
     pool_size: int = 0,
     stochastic: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
@@ -43,7 +45,8 @@ def run(
       split: set of start states: held_out or train.
       engine: native, warp or jax; default: warp on a GPU, else native.
       worlds: number of worlds stepped at once; 0: one per episode, at most 1000 (native: 8).
-      robot: refuse a policy of another robot (the policy's card says which it is for).
+      robot: refuse a policy of another robot (the policy's card says which it is for); for a policy of a robot of your
+        own, the folder that `ig2mj convert robot` wrote.
       grasping: refuse a policy of another grasping mode.
       pool_size: number of start states; 0: all of the split.
       stochastic: sample actions from the policy's distribution, as in training, instead of taking its mode.
@@ -66,7 +69,7 @@ def run(
     from ig2mj.envs.shared_starts import shared_pool, shipped_states
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.evaluate import evaluation_jobs, summary
-    from ig2mj.learn.policies import Policy
+    from ig2mj.learn.policies import Policy, robot_of
     from ig2mj.learn.shipped import find_policy
     from ig2mj.tasks.pools import COUNT
 
@@ -87,7 +90,7 @@ def run(
     settings = {
         "file": str(file),
         "task": depends["task"],
-        "robot": robot or depends["robot"],
+        "robot": choose_robot(robot, own) or robot_of(loaded.card),
         "grasping": grasping or depends["grasping"],
         "engine": engine,
         "worlds": count,
@@ -125,7 +128,7 @@ def run(
         found = summary(done)
         result = {
             "env": depends["task"],
-            "robot": settings["robot"],
+            "robot": depends["robot"],
             "grasping": settings["grasping"],
             "agent": str(policy),
             "weights": loaded.weights_digest,

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import tyro
 
+from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
+
 STEPS_PER_SECOND = 30
 
 FOREVER = 10**9
@@ -16,8 +18,7 @@ FOREVER = 10**9
 def run(
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
     robot: str | None = None,
-    robot_urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
-    robot_layout: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    own: Own = NONE,
     grasping: str | None = None,
     seed: int = 0,
     pool_size: int = 8,
@@ -31,10 +32,7 @@ def run(
 
     Args:
       env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
-      robot: {robots}; default: the task's first robot.
-      robot_urdf: URDF of a robot of your own to use instead.
-      robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
-        names.
+      robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first robot.
       grasping: assisted, sticky, physical or mitten (docs/guide/environments.md); default: assisted, for robots with
         hands.
       seed: random seed of the start states.
@@ -50,27 +48,22 @@ def run(
         for binding in BINDINGS:
             print(f"{binding.shown:16} {binding.command}")
         return 0
-    from ig2mj.agents.registry import ROBOTS
     from ig2mj.cli.common.files import check_output
-    from ig2mj.cli.common.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import find_task, make
-    from ig2mj.errors import UnknownNameError
     from ig2mj.tasks.navigation.task import NavigationTask
     from ig2mj.viewer.interactive import check_display
     from ig2mj.viewer.play.session import PlaySession, launch
 
     task = find_task(env)
-    if robot is not None and robot not in ROBOTS:
-        raise UnknownNameError("robot", robot, ROBOTS)
+    robot = choose_robot(robot, own)
     check_display()
-    check_layout(robot_urdf, robot_layout)
     if record is not None:
         check_output(record)
     if grasping is None:
         grasping = "physical" if isinstance(task, NavigationTask) else "assisted"
     made = make(
         env,
-        robot if robot_urdf is None else own_robot(robot_urdf, robot_layout, robot),
+        robot,
         1,
         "native",
         grasping,

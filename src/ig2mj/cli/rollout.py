@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from ig2mj.cli.common.deprecated import renamed_options
+from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 
 if TYPE_CHECKING:
     from ig2mj.envs.environment import Environment
@@ -24,8 +25,7 @@ def run(
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
     agent: str = "random",
     robot: str | None = None,
-    robot_urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
-    robot_layout: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    own: Own = NONE,
     grasping: str | None = None,
     engine: str | None = None,
     worlds: int = 1,
@@ -47,10 +47,7 @@ def run(
       env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
       agent: zero (no motion), random, expert (scripted; the six activities have one), or a policy: a file written by
         `ig2mj train`, or the name of one that ships.
-      robot: {robots}; default: the task's first robot.
-      robot_urdf: URDF of a robot of your own to use instead (docs/guide/environments.md).
-      robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
-        names.
+      robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first robot.
       grasping: mitten (a hand holds the task's first object from the first touch on), assisted, sticky or physical
         (docs/guide/environments.md); default: the task's.
       engine: native, warp or jax; default: warp on a GPU, else native.
@@ -74,7 +71,6 @@ def run(
     import numpy as np
 
     from ig2mj.cli.common.files import check_output, check_video
-    from ig2mj.cli.common.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
     from ig2mj.errors import Ig2mjError, UnknownNameError
@@ -85,7 +81,7 @@ def run(
         raise UnknownNameError("format", format, FORMATS)
     if record is None and format != FORMATS[0]:
         raise Ig2mjError(f"--format {format} needs --record FILE")
-    check_layout(robot_urdf, robot_layout)
+    robot = choose_robot(robot, own)
     policy = None if agent in AGENTS else policy_named(agent)
     if episodes < 1 or worlds < 1:
         raise Ig2mjError(f"--episodes {episodes}, --worlds {worlds}: at least one of each is needed")
@@ -100,7 +96,7 @@ def run(
     split = "held_out" if held_out else split
     played = make(
         env,
-        robot if robot_urdf is None else own_robot(robot_urdf, robot_layout, robot),
+        robot,
         worlds,
         engine,
         grasping,

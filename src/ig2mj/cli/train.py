@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from ig2mj.cli.common.deprecated import renamed_options
+from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 
 if TYPE_CHECKING:
     from ig2mj.learn.run_config import RunOptions, RunSettings
@@ -42,6 +43,7 @@ def run(
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = (),
     algo: str | None = None,
     robot: str | None = None,
+    own: Own = NONE,
     grasping: str | None = None,
     obs: str | None = None,
     worlds: int | None = None,
@@ -64,7 +66,7 @@ def run(
       set: settings of the algorithm and of the run, e.g. utd_ratio=16 actor_layers=128,128 engine=native
         image_size=64; docs/guide/learning.md lists them.
       algo: sac (the default), ppo, bc (from --demos alone), or dagger (a scripted expert labels what the policy does).
-      robot: {robots}; default: the task's first robot.
+      robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first robot.
       grasping: mitten (a hand holds what it touches first), assisted, sticky or physical; default: the task's.
       obs: state (the default: proprioception and privileged state) or rgbd (proprioception and images, as in the
         paper).
@@ -85,6 +87,7 @@ def run(
     from ig2mj.learn.run_config import RunOptions, read_run_file, settings_of
 
     options, settings = read_run_file(config) if config is not None else ({}, ())
+    robot = choose_robot(robot, own)
     given: dict[str, Any] = {"env": env, "algo": algo, "robot": robot, "grasping": grasping, "obs": obs}
     given |= {"worlds": worlds, "minutes": minutes, "seed": seed, "devices": devices, "init_from": init_from}
     given |= {"demos": demos and str(demos), "stop_at_success": stop_at_success, "videos": videos}
@@ -124,7 +127,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
     from ig2mj.learn.iteration import AXIS
     from ig2mj.learn.occlusion.encoder_pretraining import pretrain
     from ig2mj.learn.perception import Perception, depth_range_of
-    from ig2mj.learn.policies import Policy, depends_on, world_of
+    from ig2mj.learn.policies import Policy, depends_on, robot_folder, world_of
     from ig2mj.learn.run_config import initial_policy, settings_of
     from ig2mj.learn.train import Run, train
     from ig2mj.learn.warm_start import init_from_policy
@@ -197,6 +200,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
             "devices": max(len(shared), 1),
             "device": f"{device.device_kind} ({platform.machine()})",
             "scene": world.scene.digest,
+            **robot_folder(world.made_with.get("robot")),
             **extra,
         }
         best = Best(folder, resume)

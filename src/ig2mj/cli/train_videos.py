@@ -35,7 +35,7 @@ class TrainingVideos:
     @classmethod
     def of(cls, env: Environment, run: pathlib.Path, every: float, relaxed_thresholds: bool) -> TrainingVideos:
         """Of an environment in which a policy is trained; none where `every` is 0."""
-        chosen = [env.task.name, "--robot", env.robot, "--grasping", env.grasping]
+        chosen = [env.task.name, "--robot", _robot(env), "--grasping", env.grasping]
         return cls(run, every, chosen + ["--relaxed-thresholds"] * relaxed_thresholds)
 
     def offer(self, policy: pathlib.Path, seconds: float, last: bool = False) -> None:
@@ -73,3 +73,9 @@ class TrainingVideos:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+
+
+def _robot(env: Environment) -> str:
+    """The robot's name, or the folder of one of the user's own."""
+    made = env.made_with.get("robot")
+    return made if isinstance(made, str) else env.robot

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from ig2mj.cli.common.deprecated import renamed_options
+from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 from ig2mj.errors import Ig2mjError
 
 if TYPE_CHECKING:
@@ -34,8 +35,8 @@ def run(
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     pool: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
     row: int = 0,
-    robot_urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
-    robot_layout: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    robot: str | None = None,
+    own: Own = NONE,
     robot_at: Annotated[Vec3, tyro.conf.arg(metavar="X Y DEGREES")] = (0.0, 0.0, 0.0),
     policy: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None,
 ) -> None:
@@ -60,9 +61,7 @@ def run(
       pool: page through the start states (rows) of a pool of this scene with the arrow keys; with --image, render one
         row.
       row: the row of the pool, or the policy's start state, to begin with.
-      robot_urdf: URDF of a robot to add to the scene (docs/guide/environments.md).
-      robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
-        names.
+      robot: a robot to add to the scene: {robots}, or a folder that `ig2mj convert robot` wrote.
       robot_at: its position (metres) and its angle from the x axis (degrees).
       policy: instead of a scene: watch a trained policy, by the name of one that ships (`ig2mj policies list`) or the
         folder of a run.
@@ -75,11 +74,9 @@ def run(
         return
     if scene is None:
         raise Ig2mjError("name a scene, or a policy with --policy (`ig2mj homes list` names homes)")
-    from ig2mj.cli.common.robot_urdf import check_layout
-
-    check_layout(robot_urdf, robot_layout)
-    if robot_urdf is not None and (dump is not None or pool is not None):
-        raise Ig2mjError("--robot-urdf cannot be combined with --dump or --pool")
+    robot = choose_robot(robot, own)
+    if robot is not None and (dump is not None or pool is not None):
+        raise Ig2mjError("a robot cannot be combined with --dump or --pool")
     _check(image or video, camera, eye, target, size, seconds)
     if dump is not None:
         _replay(scene, dump, image, video, camera, eye, target, size, seconds, collision, paused)
@@ -94,7 +91,7 @@ def run(
     if row:
         raise Ig2mjError("--row needs --pool or --policy")
     if image is not None:
-        home = _with_robot(scene, robot_urdf, robot_layout, robot_at)
+        home = _with_robot(scene, robot, robot_at)
         _write_image(home, image, camera, eye, target, size, seconds, collision)
         return
     import sys
@@ -107,7 +104,7 @@ def run(
     print(f"loading {scene}; the viewer opens when it is ready", file=sys.stderr, flush=True)
     from ig2mj.simulation import Simulation
 
-    world = Simulation(_with_robot(scene, robot_urdf, robot_layout, robot_at))
+    world = Simulation(_with_robot(scene, robot, robot_at))
     if seconds > 0:
         world.step(count=round(seconds * 30))
     world.launch_viewer(paused=paused)
@@ -215,17 +212,17 @@ def _page_through(scene, pool, row, image, camera, eye, target, size, collision)
     print(f"wrote {image} (row {row} of {rows.size})", file=sys.stderr)
 
 
-def _with_robot(scene: pathlib.Path, urdf: pathlib.Path | None, layout: pathlib.Path | None, at: Vec3) -> Scene:
-    """The scene, with the robot of a URDF if one is given."""
+def _with_robot(scene: pathlib.Path, robot: str | None, at: Vec3) -> Scene:
+    """The scene, with a robot if one is given."""
     import math
 
     from ig2mj.scene.scene import load_scene
 
-    if urdf is None:
+    if robot is None:
         return load_scene(scene)
-    from ig2mj.cli.common.robot_urdf import own_robot
+    from ig2mj.agents.registry import make_robot
 
-    return load_scene(scene, agents=[own_robot(urdf, layout).at(at[0], at[1], math.radians(at[2]))])
+    return load_scene(scene, agents=[make_robot(robot).at(at[0], at[1], math.radians(at[2]))])
 
 
 def _write_image(home, file, camera, eye, target, size, seconds, collision) -> None:

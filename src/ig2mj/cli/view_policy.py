@@ -26,7 +26,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
     from ig2mj.envs.registry import make
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.evaluate import acting
-    from ig2mj.learn.policies import Policy
+    from ig2mj.learn.policies import Policy, robot_of
     from ig2mj.learn.shipped import find_policy
     from ig2mj.showcase.film_strip import ENDINGS
     from ig2mj.tasks.pools import COUNT
@@ -44,7 +44,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
     depends = policy.card["depends"]
     env = make(
         depends["task"],
-        depends["robot"],
+        robot_of(policy.card),
         1,
         "native",
         depends["grasping"],

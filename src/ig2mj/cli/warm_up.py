@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
+
 if TYPE_CHECKING:
     from ig2mj.envs.environment import Environment
     from ig2mj.worlds import Worlds
@@ -17,6 +19,7 @@ def run(
     what: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="HOME|ENV")],
     worlds: int = 1024,
     robot: str | None = None,
+    own: Own = NONE,
     grasping: str | None = None,
     observations: tuple[str, ...] = (),
     engine: str | None = None,
@@ -33,7 +36,7 @@ def run(
     Args:
       what: a home or the folder of a scene, or an environment (`ig2mj list-envs`).
       worlds: number of worlds; programs are compiled for this number.
-      robot: for an environment: its robot; default: the task's first.
+      robot: for an environment: its robot, or a folder that `ig2mj convert robot` wrote; default: the task's first.
       grasping: for an environment: mitten, assisted, sticky or physical.
       observations: for an environment: additional observations, e.g. rgb depth.
       engine: native, warp or jax; default: warp on a GPU, else native.
@@ -51,7 +54,7 @@ def run(
 
     if out is not None:
         keep_compiled_in(out)
-    batch = Batch(what, worlds, robot, grasping, observations, engine)
+    batch = Batch(what, worlds, choose_robot(robot, own), grasping, observations, engine)
     seconds = _timed(batch) if arch is None else _ahead(batch, arch)
     seconds["all"] = time.perf_counter() - began
     folder = cache_folder()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 from ig2mj.errors import Ig2mjError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def run(
     engine: str = "native",
     agent: str = "zero",
     robot: str | None = None,
+    own: Own = NONE,
     seed: int = 0,
     paused: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
@@ -51,7 +53,7 @@ def run(
       engine: native, warp or jax. Only on native can objects be dragged.
       agent: for an environment: zero (no motion), random, expert, or a policy: a file written by `ig2mj train`, or the
         name of one that ships.
-      robot: for an environment: {robots}; default: the task's first robot.
+      robot: for an environment: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first.
       seed: for an environment: random seed of start states and actions.
       paused: start paused.
     """
@@ -71,6 +73,7 @@ def run(
         raise UnknownNameError("engine", engine, ENGINES)
     if goal is not None:
         parse(goal, "--goal")
+    robot = choose_robot(robot, own)
     access.listen().close()  # a port that is taken is no news for after a minute of loading
     print(f"loading {what}; the address of the page follows", file=sys.stderr, flush=True)
     from ig2mj.web.viewer import WebViewer

@@ -115,10 +115,10 @@ class EnvConfig:
     """Settings of an environment; `ig2mj.make` checks them.
 
     Attributes:
-      robot: a name of `ig2mj.agents.registry` ("humanoid", "fetch", "turtlebot", or one that you have registered), or
-        a robot itself, such as one from a URDF (`ig2mj.agents.urdf`), whose actions have every number of its
-        controller; None: the first that the task lists. In an activity that does not list it, it stands where the
-        listed one with the lowest base would.
+      robot: a name of `ig2mj.agents.registry` ("humanoid", "fetch", "turtlebot", or one that you have registered), a
+        folder that `ig2mj convert robot` wrote, or a robot itself (`ig2mj.agents.UrdfRobot`). Actions of a converted
+        robot have every number of its controller. None: the first that the task lists. In an activity that does not
+        list it, it stands where the listed one with the lowest base would.
       worlds: how many step together.
       engine: "native", "warp" or "jax"; None: "warp" where JAX has a GPU, else "native".
       grasping: "mitten" (a hand holds the task's first object from the first touch on, as in the paper's experiments),

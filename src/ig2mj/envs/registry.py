@@ -10,11 +10,13 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Mapping
 from typing import Any, Unpack, overload
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
+from ig2mj.agents.registry import find_robot, is_robot_folder
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.engine.base import whole_number
 from ig2mj.engine.registry import check_options, choose_engine, make_engine
@@ -157,6 +159,10 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     if isinstance(task, NavigationTask) and config.pool is not None:
         raise EngineError(f"a pool for {task.name}: navigation draws its own start states")
     robot = next(iter(task.robots)) if config.robot is None else config.robot
+    if isinstance(robot, str) and is_robot_folder(robot):
+        robot = os.path.realpath(robot)  # what recordings are made with
+    who, acting = find_robot(robot)
+    body = robot if isinstance(robot, str) and robot == who else acting
     whole_number("worlds", config.worlds)
     for argument in ("pool_size", "image_size", "horizon"):
         if (given := getattr(config, argument)) is not None:
@@ -170,11 +176,11 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     control = Control(config.whole_actions, config.period)
     split, pool_size = config.split, config.pool_size
     if isinstance(task, NavigationTask):
-        setup = setup_navigation(task, robot, split, pool_size, control)
+        setup = setup_navigation(task, body, split, pool_size, control)
     elif isinstance(task, BddlTask):
-        setup = setup_bddl(task, robot, config.pool, split, pool_size, control)
+        setup = setup_bddl(task, body, config.pool, split, pool_size, control)
     else:
-        setup = setup_activity(task, robot, mode, config.pool, split, pool_size, config.relaxed_thresholds, control)
+        setup = setup_activity(task, body, mode, config.pool, split, pool_size, config.relaxed_thresholds, control)
     scene, rules, controllers = setup.scene, setup.rules, setup.controllers
     known = check_names(observations, setup.objective)
     starts = setup.pool()  # may take minutes: everything that has a name is known by now
@@ -190,7 +196,6 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         settings = dataclasses.replace(settings, width=config.image_size, height=config.image_size)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], known, settings)
     observer = Observer(observations, setup.objective, perceived)
-    who = robot if isinstance(robot, str) else robot.name
     resolved = dataclasses.replace(
         config,
         robot=robot,

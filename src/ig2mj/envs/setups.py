@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD, Controller, Robot
-from ig2mj.agents.registry import ROBOTS, make_robot
+from ig2mj.agents.registry import ROBOTS, find_robot, make_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.envs.environment import Companions
@@ -114,7 +114,7 @@ def setup_activity(
 ) -> EnvSetup:
     """Of an activity. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
     task, body = place_robot(task, robot, drives=control.whole)
-    name, control = robot if isinstance(robot, str) else robot.name, control.of(body)
+    name, control = find_robot(robot)[0], control.of(body)
     scene = load_scene(task.home, agents=[body], objects=task.objects)
     check_inside(task.name, scene)
     rules = rules_of(task, scene, relaxed_thresholds)
@@ -143,8 +143,8 @@ def setup_navigation(
     task: NavigationTask, robot: str | TaskRobot, split: str, count: int | None, control: Control
 ) -> EnvSetup:
     """Of a navigation task. Arguments as of `ig2mj.make`; `count`: start states."""
-    first = make_robot(robot) if isinstance(robot, str) else robot
-    name, control = robot if isinstance(robot, str) else robot.name, control.of(first)
+    name, first = find_robot(robot)
+    control = control.of(first)
     check_able(task, name, first)
     others = [TurtleBot(name=f"other_{k}") for k in range(task.others)]
     robots: list[Robot] = [first, *others]
@@ -179,9 +179,9 @@ def setup_bddl(
     task: BddlTask, robot: str | TaskRobot, pool: Pool | None, split: str, count: int | None, control: Control
 ) -> EnvSetup:
     """Of an activity that BDDL defines. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
-    body = make_robot(robot) if isinstance(robot, str) else robot
+    name, body = find_robot(robot)
     if isinstance(robot, str):
-        check_able(task, robot, body)
+        check_able(task, name, body)
     rows = pool if pool is not None else activity_pool(task, split, count)
     x, y = standing_place(task, rows)
     body = body.at(x, y, 0.0)

@@ -23,6 +23,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.agents.registry import ROBOTS, is_robot_folder
 from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError, InputError, PolicyMismatch
 from ig2mj.files.content import decode_json
@@ -86,6 +87,22 @@ def perception_of(policy: Policy, spaces: Mapping[str, Any]) -> Perception:
 def depends_on(env: Any, perception: Perception) -> dict[str, Any]:
     """What a policy for this environment depends on."""
     return depends_of(world_of(env), perception)
+
+
+def robot_folder(made_with: Any) -> dict[str, str]:
+    """What a card keeps of the robot that an environment was made with: the folder of one of the user's own."""
+    return {"robot_folder": made_with} if isinstance(made_with, str) and is_robot_folder(made_with) else {}
+
+
+def robot_of(card: Mapping[str, Any]) -> str:
+    """The robot that a policy is for, as `ig2mj.make` takes it: a name, or the folder of the user's own robot.
+
+    A folder that is not where it was when the policy was trained leaves the name, which `make` refuses.
+    """
+    name, folder = card["depends"]["robot"], card.get("robot_folder")
+    if name in ROBOTS or not isinstance(folder, str) or not is_robot_folder(folder):
+        return name
+    return folder
 
 
 def digest(depends: Mapping[str, Any]) -> str:

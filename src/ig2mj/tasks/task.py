@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from ig2mj.agents.registry import make_robot
+from ig2mj.agents.registry import find_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.tasks.points import Hand, Point
@@ -220,7 +220,7 @@ def place_robot(task: Task, robot: str | TaskRobot, *, drives: bool = False) -> 
     Raises:
       UnknownNameError: no such robot. EngineError: see `role_of`.
     """
-    name, body = (robot, make_robot(robot)) if isinstance(robot, str) else (robot.name, robot)
+    name, body = find_robot(robot)
     role = role_of(task, name, body)
     body = body.for_activity(drives=drives, camera_tilt=role.camera_tilt, camera_pan=role.camera_pan)
     task = dataclasses.replace(task, robots={**task.robots, name: role})

@@ -40,7 +40,7 @@ from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.agents.urdf.assignment import find_layout
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.controller import UrdfController
-from ig2mj.agents.urdf.description import ROBOT_FILE, Description
+from ig2mj.agents.urdf.description import Description
 from ig2mj.agents.urdf.grip import hand_rays, with_closed_limits
 from ig2mj.agents.urdf.layout import OMNIDIRECTIONAL, Layout
 from ig2mj.agents.urdf.layout_file import read_entries
@@ -328,8 +328,3 @@ class UrdfRobot(TaskRobot):
 def own_layout(folder: pathlib.Path) -> pathlib.Path | None:
     """The file in a converted robot's folder that corrects its layout."""
     return next((file for name in LAYOUT_FILES if (file := folder / name).is_file()), None)
-
-
-def is_robot_folder(value: str | os.PathLike) -> bool:
-    """A folder that `ig2mj convert robot` wrote."""
-    return (pathlib.Path(value) / ROBOT_FILE).is_file()
