@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 
 
@@ -21,6 +22,7 @@ def run(
     hand: bool = True,
     robot: str | None = None,
     own: Own = NONE,
+    object: AddedObjects = (),
     out: pathlib.Path | None = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
@@ -36,6 +38,7 @@ def run(
       hand: let a floating hand push objects around.
       robot: what disturbs the scene: hand (it pushes objects; the default), or a robot that acts at random: {robots},
         or a folder that `ig2mj convert robot` wrote. The profile is named after it.
+      object: {object}. Needs --out: a home's own profile is of the home as it is.
       out: write profiles to OUT/<scene's name>/ instead of next to the manifests.
       json: print the profiles as JSON, by scene.
     """
@@ -45,6 +48,8 @@ def run(
         raise Ig2mjError("name at least one scene: a folder that `ig2mj convert` wrote, or a home that ships")
     if worlds < 0 or rounds < 1 or not 0 <= safety < float("inf"):
         raise Ig2mjError("--worlds and --safety must be finite and not negative, --rounds at least 1")
+    if object and out is None:
+        raise Ig2mjError("--object needs --out DIR: the profile next to a home is of the home as it is")
     from ig2mj.calibration.measuring import calibrate
     from ig2mj.cli.common.printing import add_bar, print_json, progress_bar, stdout_console
     from ig2mj.engine.warp.profile import profile_file, save_profile
@@ -52,7 +57,10 @@ def run(
     chosen = choose_robot(robot, own) or "hand"
     profiles = {}
     for scene in scenes:
-        loaded, reach = _with_hand(scene, hand) if chosen == "hand" else (_with_robot(scene, chosen), None)
+        if chosen == "hand":
+            loaded, reach = _with_hand(scene, object, hand)
+        else:
+            loaded, reach = _with_robot(scene, object, chosen), None
         with progress_bar() as bar:
             report = add_bar(bar, f"disturbing {loaded.name}")
             profile = calibrate(
@@ -75,13 +83,13 @@ def run(
         print_json(profiles)
 
 
-def _with_hand(scene: pathlib.Path, hand: bool):
+def _with_hand(scene: pathlib.Path, objects: tuple[str, ...], hand: bool):
     """The scene with a hand where it reaches most objects, and what it reaches; without a hand if it reaches none."""
     from ig2mj.cli.common.hand import with_hand
     from ig2mj.errors import EngineError
     from ig2mj.scene.scene import load_scene
 
-    loaded = load_scene(scene)
+    loaded = load_scene(scene, objects=objects)
     if not hand:
         return loaded, None
     try:
@@ -91,7 +99,7 @@ def _with_hand(scene: pathlib.Path, hand: bool):
         return loaded, None
 
 
-def _with_robot(scene: pathlib.Path, robot: str):
+def _with_robot(scene: pathlib.Path, objects: tuple[str, ...], robot: str):
     """The scene with a robot at the free position where a hand reaches most objects, else at the robot's own start."""
     from ig2mj.agents.registry import make_robot
     from ig2mj.calibration.reach import find_reach
@@ -100,11 +108,11 @@ def _with_robot(scene: pathlib.Path, robot: str):
 
     body = make_robot(robot)
     try:
-        x, y, _ = find_reach(load_scene(scene)).start
+        x, y, _ = find_reach(load_scene(scene, objects=objects)).start
     except EngineError as e:
         print(f"note: {e}; the robot stands at its own start", file=sys.stderr)
-        return load_scene(scene, [body])
-    return load_scene(scene, [body.at(x, y, 0.0)])
+        return load_scene(scene, [body], objects)
+    return load_scene(scene, [body.at(x, y, 0.0)], objects)
 
 
 def _table(title: str, profile, model):

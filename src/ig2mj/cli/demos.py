@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 
 from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
+from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 from ig2mj.cli.demos_folder import metrics
 from ig2mj.cli.demos_replay import export, replay
@@ -28,6 +29,7 @@ def collect(
     seed: int = 0,
     split: str = "train",
     pool_size: int = 0,
+    object: AddedObjects = (),
     jobs: int = 1,
     cluster: Cluster = None,
     resume: Resume = False,
@@ -50,11 +52,13 @@ def collect(
       seed: random seed of start states and noise.
       split: which start states: train or held_out.
       pool_size: number of start states; 0: all of the split.
+      object: {object}.
       jobs: number of processes, each with its own worlds.
       cluster: run on a Ray cluster: its address, or auto.
       resume: continue an interrupted collection.
     """
     from ig2mj.cli.common.files import check_output
+    from ig2mj.cli.common.objects import note_absent
     from ig2mj.cluster.job_runner import map_jobs
     from ig2mj.cluster.jobs import JobSet
     from ig2mj.demos.collection import collection_jobs, join_recordings
@@ -89,12 +93,16 @@ def collect(
         "pool_size": pool_size or None,
         "noise": noise,
         "disturbed": disturbed,
+        **({"objects": list(object)} if object else {}),
     }
-    first = make(env, robot, 1, "native", grasping, observations=VECTORS, split=split, pool_size=pool_size or None)
+    count = pool_size or None
+    common = {"observations": VECTORS, "split": split, "pool_size": count, "objects": object}
+    first = make(env, robot, 1, "native", grasping, **common)
+    note_absent(first.scene, object)
     expert_of(first)  # errors before any work
     first.close()
     title = f"demonstrations of {env}"
-    starts = {"task": env, "split": split, "count": pool_size or None}
+    starts = {"task": env, "split": split, "count": count, **({"objects": list(object)} if object else {})}
     work = JobSet(
         "ig2mj.demos.collection:collect_job",
         title,

@@ -136,6 +136,7 @@ def _replay_by_jobs(
     from ig2mj.cluster.job_runner import map_jobs
     from ig2mj.cluster.jobs import JobSet
     from ig2mj.demos.reader import Recording
+    from ig2mj.demos.replay import objects_again
     from ig2mj.demos.replay_jobs import RECORDING, join_replays, replay_jobs
     from ig2mj.envs.shared_starts import shared_pool
 
@@ -144,6 +145,7 @@ def _replay_by_jobs(
     with Recording(file) as recording:
         made = recording.value("made_with", dict)
         starts = {"task": recording.value("task", str), "split": made.get("split"), "count": made.get("pool_size")}
+        starts |= {"objects": objects_again(recording, made["objects"])} if made.get("objects") else {}
         jobs = replay_jobs(recording, {**settings, "starts": starts})
     title = f"replaying {file.name}"
     shared = {} if where.cluster is None else {RECORDING: file.read_bytes(), **shared_pool(**starts)}

@@ -9,6 +9,7 @@ import tyro
 
 from ig2mj.cli.common.deprecated import renamed_options
 from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
+from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 
 WORLDS = {"native": 8}
@@ -28,6 +29,7 @@ def run(
     own: Own = NONE,
     grasping: str | None = None,
     pool_size: int = 0,
+    object: AddedObjects = (),
     stochastic: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     jobs: int = 1,
     cluster: Cluster = None,
@@ -49,6 +51,7 @@ def run(
         own, the folder that `ig2mj convert robot` wrote.
       grasping: refuse a policy of another grasping mode.
       pool_size: number of start states; 0: all of the split.
+      object: {object}; default: those that it was trained with.
       stochastic: sample actions from the policy's distribution, as in training, instead of taking its mode.
       jobs: number of processes, each with its own worlds (the native engine uses all processors in any case).
       cluster: run on a Ray cluster: its address, or auto.
@@ -69,7 +72,7 @@ def run(
     from ig2mj.envs.shared_starts import shared_pool, shipped_states
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.evaluate import evaluation_jobs, summary
-    from ig2mj.learn.policies import Policy, robot_of
+    from ig2mj.learn.policies import Policy, objects_of, robot_of
     from ig2mj.learn.shipped import find_policy
     from ig2mj.tasks.pools import COUNT
 
@@ -100,19 +103,23 @@ def run(
         "pool_size": pool_size or None,
         "drawn": stochastic,
     }
+    objects = object or objects_of(loaded, file)
+    if objects:
+        settings["objects"] = list(objects)
     states = pool_size or COUNT.get(split, episodes)
     if episodes > states:
         words = f"--episodes {episodes}: there are {states} start states, so some are played and counted again"
         print(f"warning: {words}", file=sys.stderr)
     where, title = where_of(jobs, cluster, resume), f"evaluating {policy}"
-    starts = (depends["task"], split, pool_size or None)
-    shared = {"policy": file.read_bytes(), **(shared_pool(*starts) if cluster is not None or jobs != 1 else {})}
+    starts = {"task": depends["task"], "split": split, "count": pool_size or None}
+    starts |= {"objects": list(objects)} if objects else {}
+    shared = {"policy": file.read_bytes(), **(shared_pool(**starts) if cluster is not None or jobs != 1 else {})}
     work = JobSet(
         "ig2mj.learn.evaluate:evaluate_job",
         title,
         evaluation_jobs(settings, episodes),
         shared,
-        ("ig2mj.envs.shared_starts:start_states", dict(zip(("task", "split", "count"), starts, strict=True))),
+        ("ig2mj.envs.shared_starts:start_states", starts),
         gpu=engine != "native" and jax.default_backend() == "gpu",
     )
     began = time.monotonic()
@@ -138,7 +145,8 @@ def run(
             "drawn": stochastic,
             "engine": engine,
             "worlds": count,
-            "start_states": shipped_states(depends["task"], settings["grasping"], split),
+            "start_states": None if objects else shipped_states(depends["task"], settings["grasping"], split),
+            **({"objects": list(objects)} if objects else {}),
             **found,
         }
         if out is not None:

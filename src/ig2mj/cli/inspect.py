@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from ig2mj.cli.common.objects import AddedObjects
+
 if TYPE_CHECKING:
     from ig2mj.scene.manifest import Manifest, ObjectEntry
 
@@ -19,6 +21,7 @@ def run(
     show: tuple[Kind, ...] = ("rooms", "objects", "joints", "abilities"),
     room: Annotated[str | None, tyro.conf.arg(metavar="ROOM")] = None,
     category: Annotated[str | None, tyro.conf.arg(metavar="CATEGORY")] = None,
+    object: AddedObjects = (),
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
     """List a scene's objects, joints, abilities and rooms.
@@ -28,12 +31,14 @@ def run(
       show: which tables to print.
       room: only objects of this room instance, e.g. kitchen_0.
       category: only objects of this category, e.g. fridge.
+      object: {object}.
       json: print JSON instead of tables.
     """
+    from ig2mj.cli.common.objects import load_home
     from ig2mj.scene.manifest import load_manifest
     from ig2mj.scene.paths import scene_folder
 
-    manifest = load_manifest(scene_folder(scene))
+    manifest = load_home(scene, object).manifest if object else load_manifest(scene_folder(scene))
     objects = _select(manifest, room, category)
     if json:
         _print_json(manifest, objects, show)

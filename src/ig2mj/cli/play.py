@@ -7,6 +7,7 @@ from typing import Annotated
 
 import tyro
 
+from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 
 STEPS_PER_SECOND = 30
@@ -22,6 +23,7 @@ def run(
     grasping: str | None = None,
     seed: int = 0,
     pool_size: int = 8,
+    object: AddedObjects = (),
     record: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     keys: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
@@ -37,6 +39,7 @@ def run(
         hands.
       seed: random seed of the start states.
       pool_size: number of start states; an activity's are sampled first, which takes a while.
+      object: {object}.
       record: HDF5 file to record all runs to, for `ig2mj demos replay`; it lacks what the mouse does to objects.
       keys: print the keys and exit.
     """
@@ -49,6 +52,7 @@ def run(
             print(f"{binding.shown:16} {binding.command}")
         return 0
     from ig2mj.cli.common.files import check_output
+    from ig2mj.cli.common.objects import note_absent
     from ig2mj.envs.registry import find_task, make
     from ig2mj.tasks.navigation.task import NavigationTask
     from ig2mj.viewer.interactive import check_display
@@ -70,7 +74,9 @@ def run(
         pool_size=pool_size,
         whole_actions=True,
         period=1 / STEPS_PER_SECOND,
+        objects=object,
     ).with_horizon(FOREVER)
+    note_absent(made.scene, object)
     made.step(made.reset(seed), np.zeros((1, *made.action_space.shape), np.float32))  # compiles before the window opens
     if record is not None:
         from ig2mj.demos import record as recorded

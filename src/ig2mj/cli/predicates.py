@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from ig2mj.cli.common.objects import AddedObjects
+
 if TYPE_CHECKING:
     from ig2mj.predicates.logic import Atom
     from ig2mj.simulation import Simulation
@@ -19,6 +21,7 @@ def run(
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0,
     compat: Literal["paper", "igibson"] = "paper",
     strict: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    object: AddedObjects = (),
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
     """Show which predicates are true in a scene, or whether an expression holds and why not.
@@ -34,13 +37,14 @@ def run(
       seconds: simulate this many seconds first.
       compat: follow the paper, or iGibson's code where the two differ.
       strict: report an error, instead of false, for an object that lacks the predicate's ability.
+      object: {object}.
       json: print JSON instead of text.
     """
     from ig2mj.cli.common.worlds import started
     from ig2mj.predicates import parse
 
     parsed = None if expression is None else parse(expression, "EXPRESSION")
-    world = started(scene, compat, seconds, set, lambda world: parsed is None or world.compiled(parsed, strict))
+    world = started(scene, compat, seconds, set, lambda world: parsed is None or world.compiled(parsed, strict), object)
     if parsed is None:
         _print_holding(world, json)
         return 0

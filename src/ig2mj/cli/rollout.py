@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from ig2mj.cli.common.deprecated import renamed_options
+from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def run(
     held_out: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     pool_size: int = 0,
     variant: int = 0,
+    object: AddedObjects = (),
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     record: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     format: str = "ig2mj",
@@ -58,6 +60,7 @@ def run(
       held_out: play the first EPISODES held-out start states, each once.
       pool_size: number of start states; 0: all of the split.
       variant: variant of the activity's objects: 1 and 2 use other models of the same categories.
+      object: {object}. Default: those that the policy was trained with.
       video: video of the first episode of the first world (.mp4, .gif), or five of its frames in a row (.png,
         .jpg); needs OpenGL. With it the default engine is native on a GPU, too.
       record: HDF5 file to record all worlds to, for `ig2mj demos replay`.
@@ -71,10 +74,12 @@ def run(
     import numpy as np
 
     from ig2mj.cli.common.files import check_output, check_video
+    from ig2mj.cli.common.objects import note_absent
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.install_hint import require_module
+    from ig2mj.learn.policies import objects_of
     from ig2mj.process.progress import progress
 
     if format not in FORMATS:
@@ -94,6 +99,7 @@ def run(
         require_module("h5py")
         check_output(record)
     split = "held_out" if held_out else split
+    objects = object or (() if policy is None else objects_of(policy, agent))
     played = make(
         env,
         robot,
@@ -105,7 +111,9 @@ def run(
         split=split,
         pool_size=pool_size or None,
         variant=variant,
+        objects=objects,
     )
+    note_absent(played.scene, objects)
     if record is not None:
         from ig2mj.demos import record as recorded
 

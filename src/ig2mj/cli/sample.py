@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from ig2mj.cli.common.jobs import Cluster, Resume, where_of
+from ig2mj.cli.common.objects import AddedObjects
 
 if TYPE_CHECKING:
     from ig2mj.cluster.job_runner import Where
@@ -22,7 +23,8 @@ def run(
     jobs: int = 0,
     cluster: Cluster = None,
     resume: Resume = False,
-    add: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CATEGORY")] = (),
+    object: AddedObjects = (),
+    add: Annotated[tuple[str, ...], tyro.conf.Suppress] = (),
     disturb: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     share: float = 0.3,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
@@ -42,13 +44,17 @@ def run(
       jobs: number of processes; 0: one per processor.
       cluster: run on a Ray cluster: its address, or auto.
       resume: continue an interrupted run.
-      add: add an object of this category (or category/model) from the object library.
+      object: {object}.
+      add: old name of --object.
       disturb: instead of conditions: shift, turn and drop loose objects at random.
       share: with --disturb: probability that a loose object is moved.
       json: print the result as JSON.
     """
+    import sys
+
     from ig2mj.cli.common.files import check_output
     from ig2mj.errors import Ig2mjError
+    from ig2mj.process.deprecation import rename_text
     from ig2mj.scene.scene import load_scene
 
     if count < 1:
@@ -62,7 +68,9 @@ def run(
     file = out or pathlib.Path("pool.npz")
     check_output(file)
     where = where_of(jobs, cluster, resume)
-    loaded = load_scene(scene, objects=add)
+    if add:
+        print(f"ig2mj sample: {rename_text('--add', '--object')}", file=sys.stderr)
+    loaded = load_scene(scene, objects=(*add, *object))
     if disturb:
         return _disturb(loaded, count, file, seed, share, where)
     return _sample(loaded, conditions, count, file, seed, where, json)

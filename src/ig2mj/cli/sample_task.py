@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from ig2mj.cli.common.deprecated import renamed_options
+from ig2mj.cli.common.objects import AddedObjects
 
 if TYPE_CHECKING:
     from ig2mj.tasks.task import Task
@@ -22,6 +23,7 @@ def run(
     force: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     variant: int = 0,
     grasping: str = "mitten",
+    object: AddedObjects = (),
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None,
 ) -> int:
     """Sample the start states of an environment and store them where `ig2mj.make` finds them.
@@ -39,12 +41,14 @@ def run(
       force: sample again even if the cache has the pool.
       variant: variant of the activity's objects: 1 and 2 use other models of the same categories.
       grasping: physical: with objects that fit between two fingers, for activities that have some (TASK all: both).
+      object: {object}; the same as of `ig2mj train` and the others.
       out: folder for the pools, instead of the cache.
     """
     from ig2mj.agents.grasping import MODES
     from ig2mj.envs.registry import find_task
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.tasks.activities import ACTIVITIES
+    from ig2mj.tasks.added_objects import with_objects
     from ig2mj.tasks.pools import COUNT
     from ig2mj.tasks.task import Task
     from ig2mj.tasks.variants import variant as task_variant
@@ -53,6 +57,8 @@ def run(
         raise Ig2mjError(f"--count {count}, --jobs {jobs}: neither can be negative")
     if grasping not in MODES:
         raise UnknownNameError("grasping mode", grasping, MODES)
+    if task == "all" and object:
+        raise Ig2mjError("--object is of one task: name it in place of all")
     if task == "all":
         tasks = [task_variant(each, variant) for each in ACTIVITIES.values()]
         tasks += [task_variant(each, variant, "physical") for each in ACTIVITIES.values() if each.physical is not None]
@@ -60,7 +66,9 @@ def run(
     found = find_task(task)
     if not isinstance(found, Task):
         raise UnknownNameError("task with a pool of start states", task, ACTIVITIES)
-    return _keep([(task_variant(found, variant, grasping), split)], count, jobs, force, out)
+    chosen = with_objects(task_variant(found, variant, grasping), object)
+    assert isinstance(chosen, Task)
+    return _keep([(chosen, split)], count, jobs, force, out)
 
 
 def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, force: bool, out: pathlib.Path | None) -> int:

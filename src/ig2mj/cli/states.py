@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import pathlib
+import sys
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
@@ -14,7 +16,10 @@ if TYPE_CHECKING:
 
 def run(
     scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
-    object: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = (),
+    only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = (),
+    object: Annotated[
+        tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="DIR|NAME[@PLACE]")
+    ] = (),
     state: Annotated[tuple[str, ...], tyro.conf.arg(metavar="STATE ...")] = (),
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="STATE=OBJECT[=VALUE] ...")] = (),
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0,
@@ -27,7 +32,8 @@ def run(
 
     Args:
       scene: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj.
-      object: only these objects, with all their states.
+      only: only these objects, with all their states.
+      object: {object}.
       state: only these states, e.g. temperature in_contact_objs.
       set: set states first, e.g. toggled_on=stove_0 or temperature=fish_0=80.
       seconds: simulate this many seconds first.
@@ -39,8 +45,11 @@ def run(
     from ig2mj.errors import UnknownNameError
     from ig2mj.states import registry
 
+    added, named = _added(scene, [text for texts in object for text in texts])
+    only = (*only, *named)
+
     def check(world: Simulation) -> None:
-        for name in object:
+        for name in only:
             if name not in world.scene.object_names:
                 raise UnknownNameError("object", name, world.scene.object_names)
 
@@ -48,18 +57,31 @@ def run(
         names = [registry.find(s).name for s in state]
     else:
         # Those that every object has fill a table by themselves: poses, boxes, contacts, rooms.
-        names = [s.name for s in registry.SPECS if object or s.abilities is not None]
-    world = started(scene, compat, seconds, set, check)
+        names = [s.name for s in registry.SPECS if only or s.abilities is not None]
+    world = started(scene, compat, seconds, set, check, added)
     rows: dict[str, dict[str, Any]] = {}
     for name in names:
         kind = registry.STATES[name]
-        for o in object or world.scene.object_names:
+        for o in only or world.scene.object_names:
             if kind.belongs_to(world.state_model, world.scene.object_index(o)):
                 rows.setdefault(o, {})[name] = world.state(name, o)
     if json:
         print_json({"name": world.scene.name, "time": round(world.time, 6), "objects": rows})
     else:
         _print_table(world, names, rows)
+
+
+def _added(scene: pathlib.Path, given: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Values of `--object`: what is added to the home, and objects of the home, which `--only` names."""
+    from ig2mj.process.deprecation import rename_text
+    from ig2mj.scene.manifest import load_manifest
+    from ig2mj.scene.paths import scene_folder
+
+    own = {o.name for o in load_manifest(scene_folder(scene)).objects} if given else ()
+    named = [text for text in given if text in own]
+    if named:
+        print(f"ig2mj states: {rename_text(f'--object {named[0]}', f'--only {named[0]}')}", file=sys.stderr)
+    return [text for text in given if text not in own], named
 
 
 def _print_table(world: Simulation, names: list[str], rows: dict[str, dict[str, Any]]) -> None:

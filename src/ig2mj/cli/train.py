@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from ig2mj.cli.common.deprecated import renamed_options
+from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ def run(
     init_from: str | None = None,
     stop_at_success: float | None = None,
     videos: float | None = None,
+    object: AddedObjects = (),
 ) -> int:
     """Train a policy in an environment.
 
@@ -82,6 +84,7 @@ def run(
       stop_at_success: stop once this share of the last episodes succeeds, e.g. 0.98.
       videos: minutes between two videos of a held-out episode, written to the run's folder videos; default: none. A
         process of low priority makes them; they need OpenGL and ffmpeg.
+      object: {object}.
     """
     from ig2mj.learn.algorithms import check_settings
     from ig2mj.learn.run_config import RunOptions, read_run_file, settings_of
@@ -91,6 +94,7 @@ def run(
     given: dict[str, Any] = {"env": env, "algo": algo, "robot": robot, "grasping": grasping, "obs": obs}
     given |= {"worlds": worlds, "minutes": minutes, "seed": seed, "devices": devices, "init_from": init_from}
     given |= {"demos": demos and str(demos), "stop_at_success": stop_at_success, "videos": videos}
+    given |= {"objects": object or None}
     chosen = RunOptions(**{**options, **{name: value for name, value in given.items() if value is not None}})
     changes = (*settings, *set)
     found, config_of_algorithm, occlusion = settings_of(chosen.algo, changes)
@@ -113,6 +117,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
 
     import jax
 
+    from ig2mj.cli.common.objects import note_absent
     from ig2mj.cli.train_videos import TrainingVideos
     from ig2mj.cluster.process_topology import find_topology
     from ig2mj.cluster.team import Team
@@ -127,7 +132,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
     from ig2mj.learn.iteration import AXIS
     from ig2mj.learn.occlusion.encoder_pretraining import pretrain
     from ig2mj.learn.perception import Perception, depth_range_of
-    from ig2mj.learn.policies import Policy, depends_on, robot_folder, world_of
+    from ig2mj.learn.policies import Policy, depends_on, objects_on_card, robot_folder, world_of
     from ig2mj.learn.run_config import initial_policy, settings_of
     from ig2mj.learn.train import Run, train
     from ig2mj.learn.warm_start import init_from_policy
@@ -162,7 +167,9 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
                 pool_size=settings.pool_size or None,
                 augment_starts=settings.augment_starts,
                 sensors=SensorOptions(rows=rendered_rows(settings.rows, settings.image_size)),
+                objects=chosen.objects,
             )
+            note_absent(world.scene, chosen.objects)
         depth_range = settings.depth_range or depth_range_of(world)
         images = settings.image_size, settings.rows, world.privileged_names, depth_range
         perception = Perception(world.observation_spaces, obs, *images)
@@ -201,6 +208,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
             "device": f"{device.device_kind} ({platform.machine()})",
             "scene": world.scene.digest,
             **robot_folder(world.made_with.get("robot")),
+            **objects_on_card(world),
             **extra,
         }
         best = Best(folder, resume)

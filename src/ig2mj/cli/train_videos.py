@@ -35,7 +35,10 @@ class TrainingVideos:
     @classmethod
     def of(cls, env: Environment, run: pathlib.Path, every: float, relaxed_thresholds: bool) -> TrainingVideos:
         """Of an environment in which a policy is trained; none where `every` is 0."""
+        from ig2mj.tasks.added_objects import object_texts
+
         chosen = [env.task.name, "--robot", _robot(env), "--grasping", env.grasping]
+        chosen += [f"--object={text}" for text in object_texts(env.config.objects)]
         return cls(run, every, chosen + ["--relaxed-thresholds"] * relaxed_thresholds)
 
     def offer(self, policy: pathlib.Path, seconds: float, last: bool = False) -> None:

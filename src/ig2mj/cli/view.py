@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from ig2mj.cli.common.deprecated import renamed_options
+from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 from ig2mj.errors import Ig2mjError
 
@@ -35,6 +36,7 @@ def run(
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     pool: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
     row: int = 0,
+    object: AddedObjects = (),
     robot: str | None = None,
     own: Own = NONE,
     robot_at: Annotated[Vec3, tyro.conf.arg(metavar="X Y DEGREES")] = (0.0, 0.0, 0.0),
@@ -61,6 +63,7 @@ def run(
       pool: page through the start states (rows) of a pool of this scene with the arrow keys; with --image, render one
         row.
       row: the row of the pool, or the policy's start state, to begin with.
+      object: {object}.
       robot: a robot to add to the scene: {robots}, or a folder that `ig2mj convert robot` wrote.
       robot_at: its position (metres) and its angle from the x axis (degrees).
       policy: instead of a scene: watch a trained policy, by the name of one that ships (`ig2mj policies list`) or the
@@ -69,7 +72,7 @@ def run(
     if policy is not None:
         from ig2mj.cli.view_policy import view_policy
 
-        _only_policy(scene, image, dump, pool, camera, eye, target, seconds, collision)
+        _only_policy(scene, image, dump, pool, camera, eye, target, seconds, collision, object)
         view_policy(policy, video, row, paused)
         return
     if scene is None:
@@ -79,19 +82,19 @@ def run(
         raise Ig2mjError("a robot cannot be combined with --dump or --pool")
     _check(image or video, camera, eye, target, size, seconds)
     if dump is not None:
-        _replay(scene, dump, image, video, camera, eye, target, size, seconds, collision, paused)
+        _replay(scene, object, dump, image, video, camera, eye, target, size, seconds, collision, paused)
         return
     if video is not None:
         raise Ig2mjError("--video needs --dump or --policy")
     if pool is not None:
-        if seconds > 0:
-            raise Ig2mjError("--pool cannot be combined with --seconds")
+        if seconds > 0 or object:
+            raise Ig2mjError("--pool cannot be combined with --seconds and --object: a pool knows its objects")
         _page_through(scene, pool, row, image, camera, eye, target, size, collision)
         return
     if row:
         raise Ig2mjError("--row needs --pool or --policy")
     if image is not None:
-        home = _with_robot(scene, robot, robot_at)
+        home = _with_robot(scene, object, robot, robot_at)
         _write_image(home, image, camera, eye, target, size, seconds, collision)
         return
     import sys
@@ -104,7 +107,7 @@ def run(
     print(f"loading {scene}; the viewer opens when it is ready", file=sys.stderr, flush=True)
     from ig2mj.simulation import Simulation
 
-    world = Simulation(_with_robot(scene, robot, robot_at))
+    world = Simulation(_with_robot(scene, object, robot, robot_at))
     if seconds > 0:
         world.step(count=round(seconds * 30))
     world.launch_viewer(paused=paused)
@@ -160,7 +163,7 @@ def _view(home, data, camera: str | None, eye: Vec3 | None, target: Vec3 | None)
     )
 
 
-def _replay(scene, dump, image, video, camera, eye, target, size, seconds, collision, paused) -> None:
+def _replay(scene, objects, dump, image, video, camera, eye, target, size, seconds, collision, paused) -> None:
     import sys
 
     from PIL import Image
@@ -174,7 +177,7 @@ def _replay(scene, dump, image, video, camera, eye, target, size, seconds, colli
         raise Ig2mjError("--dump takes one of --image and --video, and no --seconds")
     if video is not None and video.suffix.lower() not in VIDEOS:
         raise Ig2mjError(f"{video}: is not a video format that can be written (use {' or '.join(VIDEOS)})")
-    replay = Replay(load_scene(scene), dump)
+    replay = Replay(load_scene(scene, objects=objects), dump)
     print(f"{dump}: {len(replay)} steps; {replay.note.get('text', '')}", file=sys.stderr)
     if image is None and video is None:
         replay.launch(paused=paused)
@@ -212,17 +215,17 @@ def _page_through(scene, pool, row, image, camera, eye, target, size, collision)
     print(f"wrote {image} (row {row} of {rows.size})", file=sys.stderr)
 
 
-def _with_robot(scene: pathlib.Path, robot: str | None, at: Vec3) -> Scene:
-    """The scene, with a robot if one is given."""
+def _with_robot(scene: pathlib.Path, objects: tuple[str, ...], robot: str | None, at: Vec3) -> Scene:
+    """The scene with objects, and with a robot if one is given."""
     import math
 
-    from ig2mj.scene.scene import load_scene
+    from ig2mj.cli.common.objects import load_home
 
     if robot is None:
-        return load_scene(scene)
+        return load_home(scene, objects)
     from ig2mj.agents.registry import make_robot
 
-    return load_scene(scene, agents=[make_robot(robot).at(at[0], at[1], math.radians(at[2]))])
+    return load_home(scene, objects, [make_robot(robot).at(at[0], at[1], math.radians(at[2]))])
 
 
 def _write_image(home, file, camera, eye, target, size, seconds, collision) -> None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ig2mj.cli.common.objects import AddedObjects
+
 if TYPE_CHECKING:
     from ig2mj.vr.session import Session
 
@@ -27,6 +29,7 @@ def run(
     seed: int = 0,
     row: int = -1,
     pool_size: int = 0,
+    object: AddedObjects = (),
     seconds: float = 0.0,
     timing: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
@@ -48,6 +51,7 @@ def run(
       seed: random seed.
       row: number of the start state; -1: a random one.
       pool_size: number of start states; 0: all that the task has.
+      object: {object}.
       seconds: end after this many seconds; 0: run until you end it.
       timing: show every two seconds how a frame's time divides into physics, states, rendering and waiting.
     """
@@ -70,7 +74,7 @@ def run(
 
         check_page()
         access = access_for(host, port, token, certificate, key)
-    env = _environment(task, grasping, pool_size, row)
+    env = _environment(task, grasping, pool_size, row, object)
     if device == "page":
         return _serve(env, access, common, seconds, timing)
     if device == "openxr":
@@ -81,11 +85,13 @@ def run(
     return _repeat(env, poses, common)
 
 
-def _environment(task: str, grasping: str, pool_size: int, row: int):
+def _environment(task: str, grasping: str, pool_size: int, row: int, objects: tuple[str, ...]):
+    from ig2mj.cli.common.objects import note_absent
     from ig2mj.errors import Ig2mjError
     from ig2mj.vr.session import person_environment
 
-    env = person_environment(task, grasping, pool_size=pool_size or None)
+    env = person_environment(task, grasping, pool_size=pool_size or None, objects=objects)
+    note_absent(env.scene, objects)
     if row >= env.core.starts.pool.size:
         raise Ig2mjError(f"--row {row}: the task has start states 0 to {env.core.starts.pool.size - 1}")
     return env

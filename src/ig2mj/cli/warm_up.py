@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ def run(
     grasping: str | None = None,
     observations: tuple[str, ...] = (),
     engine: str | None = None,
+    object: AddedObjects = (),
     arch: int | None = None,
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FOLDER")] = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
@@ -40,6 +42,7 @@ def run(
       grasping: for an environment: mitten, assisted, sticky or physical.
       observations: for an environment: additional observations, e.g. rgb depth.
       engine: native, warp or jax; default: warp on a GPU, else native.
+      object: {object}.
       arch: compile the kernels of a physics step for GPUs of this architecture (compute capability times ten: 90 is
         an H100 or H200); this machine needs none. JAX's programs and rendering are compiled where the GPU is.
       out: folder of the cache; default: IG2MJ_CACHE_DIR, or the user's own.
@@ -54,7 +57,7 @@ def run(
 
     if out is not None:
         keep_compiled_in(out)
-    batch = Batch(what, worlds, choose_robot(robot, own), grasping, observations, engine)
+    batch = Batch(what, worlds, choose_robot(robot, own), grasping, observations, engine, object)
     seconds = _timed(batch) if arch is None else _ahead(batch, arch)
     seconds["all"] = time.perf_counter() - began
     folder = cache_folder()
@@ -81,6 +84,7 @@ class Batch:
     grasping: str | None
     observations: tuple[str, ...]
     engine: str | None
+    objects: tuple[str, ...] = ()
 
     def make(self, pool_size: int | None = None) -> Worlds | Environment:
         """Raises Ig2mjError: a home with options of environments."""
@@ -92,15 +96,14 @@ class Batch:
 
         if short_name(self.what) is not None or activity_name(self.what) is not None:
             seen = (*VECTORS, *self.observations)
-            return ig2mj.make(
-                self.what, self.robot, self.worlds, self.engine, self.grasping, observations=seen, pool_size=pool_size
-            )
+            options: dict[str, Any] = {"observations": seen, "pool_size": pool_size, "objects": self.objects}
+            return ig2mj.make(self.what, self.robot, self.worlds, self.engine, self.grasping, **options)
         if not (pathlib.Path(self.what).exists() or (SHIPPED_HOMES / self.what).is_dir()):
             short = self.what.removeprefix(f"{NAMESPACE}/")
             raise UnknownNameError("home or environment", short, (*shipped_homes(), *NAMES))
         if self.robot is not None or self.grasping is not None or self.observations:
             raise Ig2mjError("--robot, --grasping and --observations belong to environments; a home is stepped without")
-        return ig2mj.Worlds(self.what, self.worlds, self.engine)
+        return ig2mj.Worlds(self.what, self.worlds, self.engine, objects=self.objects)
 
 
 MOST_WORLDS = 64

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 from ig2mj.errors import Ig2mjError, UnknownNameError
 
@@ -32,6 +33,7 @@ def run(
     robot: str | None = None,
     own: Own = NONE,
     seed: int = 0,
+    object: AddedObjects = (),
     paused: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
     """Show a scene, an environment or a recording in the browser.
@@ -55,6 +57,7 @@ def run(
         name of one that ships.
       robot: for an environment: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first.
       seed: for an environment: random seed of start states and actions.
+      object: {object}.
       paused: start paused.
     """
     import sys
@@ -78,7 +81,7 @@ def run(
     print(f"loading {what}; the address of the page follows", file=sys.stderr, flush=True)
     from ig2mj.web.viewer import WebViewer
 
-    source = _source(what, goal, set, pool, worlds, engine, agent, robot, seed)
+    source = _source(what, goal, set, pool, worlds, engine, agent, robot, seed, object)
     with WebViewer(source, access, playing=not paused, title=f"ig2mj: {pathlib.Path(what).name}") as viewer:
         print(viewer.url, flush=True)
         viewer.wait()
@@ -94,6 +97,7 @@ def _source(
     agent: str,
     robot: str | None,
     seed: int,
+    objects: tuple[str, ...] = (),
 ) -> Source:
     from ig2mj.envs.names import NAMES, activity_name, short_name
     from ig2mj.scene.paths import SHIPPED_HOMES, shipped_homes
@@ -107,11 +111,13 @@ def _source(
         raise Ig2mjError("--goal, --set and --pool are for a scene; tasks and recordings have their own")
     if not task and (agent != "zero" or robot is not None):
         raise Ig2mjError("--agent and --robot are for a task")
+    if objects and (recorded or pool is not None):
+        raise Ig2mjError("--object is for a scene or a task: recordings and pools know their objects")
     if recorded:
         return _recording(file)
     if task:
-        return _task(what, worlds, engine, agent, robot, seed)
-    return _home(what, goal, set, pool, worlds, engine)
+        return _task(what, worlds, engine, agent, robot, seed, objects)
+    return _home(what, goal, set, pool, worlds, engine, objects)
 
 
 def _recording(file: pathlib.Path) -> Source:
@@ -126,26 +132,40 @@ def _recording(file: pathlib.Path) -> Source:
     return source
 
 
-def _task(name: str, worlds: int, engine: str, agent: str, robot: str | None, seed: int) -> Source:
+def _task(
+    name: str, worlds: int, engine: str, agent: str, robot: str | None, seed: int, objects: tuple[str, ...]
+) -> Source:
+    from ig2mj.cli.common.objects import note_absent
     from ig2mj.cli.rollout import AGENTS, policy_named, who_acts
     from ig2mj.envs.registry import VECTORS, make
+    from ig2mj.learn.policies import objects_of
     from ig2mj.web.sources import Acting
 
     policy = None if agent in AGENTS else policy_named(agent)
-    env = make(name, robot, worlds, engine, observations=VECTORS if policy is None else policy.observations)
+    if policy is not None and not objects:
+        objects = objects_of(policy, agent)
+    seen = VECTORS if policy is None else policy.observations
+    env = make(name, robot, worlds, engine, observations=seen, objects=objects)
+    note_absent(env.scene, objects)
     return Acting(env, who_acts(agent, policy, env, seed), seed)
 
 
 def _home(
-    name: str, goal: str | None, set: tuple[str, ...], pool: pathlib.Path | None, worlds: int, engine: str
+    name: str,
+    goal: str | None,
+    set: tuple[str, ...],
+    pool: pathlib.Path | None,
+    worlds: int,
+    engine: str,
+    objects: tuple[str, ...],
 ) -> Source:
     import jax
     import numpy as np
 
+    from ig2mj.cli.common.objects import load_home
     from ig2mj.cli.common.worlds import started
     from ig2mj.engine.registry import make_engine
     from ig2mj.predicates import parse
-    from ig2mj.scene.scene import load_scene
     from ig2mj.web.sources import Home
     from ig2mj.worlds.core import Core
     from ig2mj.worlds.pool import load_pool, load_pool_scene
@@ -154,12 +174,12 @@ def _home(
     if pool is not None and set:
         raise Ig2mjError("--set cannot be combined with --pool")
     wanted = None if goal is None else parse(goal, "--goal")
-    scene = load_scene(name) if pool is None else load_pool_scene(pool, name)
+    scene = load_home(name, objects) if pool is None else load_pool_scene(pool, name)
     rules = Rules.of_scene(scene)
     compiled = None if wanted is None else rules.compiled(wanted)
     core = Core(make_engine(engine, scene, worlds), rules, None if pool is None else load_pool(pool, scene))
     if not set:
         return Home(scene, core, compiled)
-    one = started(pathlib.Path(name), "paper", 0.0, set)
+    one = started(pathlib.Path(name), "paper", 0.0, set, objects=[a.wanted for a in scene.additions])
     states = jax.tree.map(lambda a: np.repeat(np.asarray(a), worlds, 0), one.states)
     return Home(scene, core, compiled, lambda core, batch: core.load(batch, one.engine.export(one.physics, 0), states))

@@ -10,7 +10,7 @@ import contextlib
 import os
 import pathlib
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -145,6 +145,7 @@ def collect_job(
     episodes: int,
     seed: int,
     shared: Mapping[str, bytes] | None = None,
+    objects: Sequence[str] = (),
 ) -> bytes:
     """The bytes of a recording. Arguments: of `ig2mj.make` and of `collect`.
 
@@ -152,8 +153,8 @@ def collect_job(
       Ig2mjError: nearly all episodes fail. WholeRunError: there is no such environment.
     """
     try:
-        keep_pool(shared or {}, env, split, pool_size)
-        starts: dict[str, Any] = {"split": split, "pool_size": pool_size}
+        keep_pool(shared or {}, env, split, pool_size, objects)
+        starts: dict[str, Any] = {"split": split, "pool_size": pool_size, "objects": objects}
         played = make(env, robot, worlds, engine, grasping, observations=observations, **starts)
     except Ig2mjError as e:
         raise WholeRunError(e) from e

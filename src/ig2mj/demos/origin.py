@@ -26,6 +26,7 @@ from ig2mj.demos.model_hash import appearance_hash, physics_hash, whole_hash
 from ig2mj.demos.task_hash import task_hash, whole_task_hash
 from ig2mj.demos.writer import FORMAT_VERSION
 from ig2mj.envs.environment import Environment
+from ig2mj.scene.found_again import entries_of
 from ig2mj.scene.scene import Scene
 from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.pool import Pool
@@ -87,6 +88,7 @@ def origin_of_scene(scene: Scene, version: int = FORMAT_VERSION) -> dict[str, An
         "appearance_hash": appearance_hash(scene.model),
         "objects": json.dumps(list(scene.object_names)),
         "additions": json.dumps(additions),
+        "additions_found_by": json.dumps(entries_of(scene.additions)),
     }
 
 

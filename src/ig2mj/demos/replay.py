@@ -40,6 +40,7 @@ from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import VECTORS, find_task, make
 from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.process import entry_point
+from ig2mj.scene.found_again import requests_again
 from ig2mj.tasks.task import Task
 
 MODES = ("action", "state")
@@ -270,6 +271,14 @@ class Replayer:
             yield from rows
 
 
+def objects_again(recording: Recording, wanted: Any) -> tuple[str, ...]:
+    """What was added to the home, where it is now. Raises InputError: it is missing."""
+    if not isinstance(wanted, list) or not all(isinstance(text, str) for text in wanted):
+        raise InputError(recording.file, "has objects that are no list of texts", element="attribute made_with")
+    known = recording.value("additions_found_by", list)
+    return requests_again(wanted, known[-len(wanted) :], recording.file)
+
+
 def recorded_observations(recording: Recording) -> tuple[str, ...]:
     """Names of the observations that the recorded environment made. Raises InputError."""
     if "observations" not in recording.header:
@@ -293,6 +302,8 @@ def _environment(recording: Recording, observations: str | Sequence[str], option
     if recording.header.get("not_made_with", "[]") != "[]":
         missing = ", ".join(map(str, recording.value("not_made_with", list)))
         raise InputError(recording.file, f"does not have what its environment was made with: {missing}", fix=FIX_ENV)
+    if made.get("objects"):
+        made = {**made, "objects": objects_again(recording, made["objects"])}
     if "sensors" in recording.header and "sensors" not in options:
         sensors = recording.value("sensors", dict)
         large = [name for name, value in sensors.items() if isinstance(value, int) and value > MOST_PIXELS]

@@ -28,7 +28,7 @@ from ig2mj.envs.setups import Control, setup_activity, setup_bddl, setup_navigat
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.sensors.suite import SensorSuite
-from ig2mj.tasks.added_objects import canonical, requests, with_objects
+from ig2mj.tasks.added_objects import object_texts, with_objects
 from ig2mj.tasks.bddl.task import BddlTask, bddl_task
 from ig2mj.tasks.homes import AnyTask, in_home
 from ig2mj.tasks.mixing import mixed_pool
@@ -144,7 +144,7 @@ def make(
 def _make(task: AnyTask, config: EnvConfig) -> Environment:
     if config.home is not None:
         task = in_home(task, config.home)
-    objects = tuple(canonical(request) for request in requests(config.objects))
+    objects = object_texts(config.objects)
     observations = (config.observations,) if isinstance(config.observations, str) else tuple(config.observations)
     mode = task.grasping if config.grasping is None else config.grasping
     if mode not in MODES:

@@ -100,6 +100,7 @@ def evaluate_job(
     first: int,
     episodes: int,
     shared: Mapping[str, bytes],
+    objects: Sequence[str] = (),
 ) -> bytes:
     """Episodes from the start states `first` on, as JSON: how each ended, what went wrong, and how long it took until
     the first step was taken ("start_seconds").
@@ -111,8 +112,8 @@ def evaluate_job(
     """
     began = time.monotonic()
     try:
-        keep_pool(shared, task, split, pool_size)
-        made = (task, robot, grasping, engine, worlds, tuple(observations), paper_rl, split, pool_size)
+        keep_pool(shared, task, split, pool_size, objects)
+        made = (task, robot, grasping, engine, worlds, tuple(observations), paper_rl, split, pool_size, tuple(objects))
         env, actor = _player(shared["policy"], file, drawn, *made)
     except Ig2mjError as e:
         raise WholeRunError(e) from e
@@ -139,6 +140,7 @@ def _player(
     paper_rl: bool,
     split: str,
     pool_size: int | None,
+    objects: tuple[str, ...],
 ) -> tuple[Environment, Actor]:
     """The environment and its agent, the same in all jobs of an evaluation, so that they are compiled once.
 
@@ -150,6 +152,7 @@ def _player(
         "relaxed_thresholds": paper_rl,
         "split": split,
         "pool_size": pool_size,
+        "objects": objects,
     }
     env = make(task, robot, worlds, engine, grasping, **made)
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:

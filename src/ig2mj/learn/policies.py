@@ -38,6 +38,8 @@ from ig2mj.learn.perception import DEPTH_RANGE, SIZE, Perception
 from ig2mj.learn.policy_checks import check_arrays, check_card, check_play, check_scales
 from ig2mj.learn.running_stats import RunningStats
 from ig2mj.process import entry_point
+from ig2mj.scene.found_again import entries_of, requests_again
+from ig2mj.tasks.added_objects import object_texts
 
 FORMAT_VERSION = 1
 
@@ -56,6 +58,25 @@ def world_of(env: Any) -> dict[str, Any]:
         "actions": list(getattr(env, "action_names", range(env.action_space.shape[0]))),
         "privileged": list(getattr(env, "privileged_names", ())),
     }
+
+
+def objects_on_card(env: Any) -> dict[str, Any]:
+    """Of an environment with objects added to its home (`EnvConfig.objects`) what a policy's card says of them."""
+    config = getattr(env, "config", None)
+    if config is None or not config.objects:
+        return {}
+    wanted = list(object_texts(config.objects))
+    return {"objects": wanted, "objects_found_by": entries_of(env.scene.additions[-len(wanted) :])}
+
+
+def objects_of(policy: Policy, file: object) -> tuple[str, ...]:
+    """What was added to the home where a policy was trained, for `ig2mj.make(objects=...)`, where it is now.
+
+    Raises:
+      InputError: it is missing; names `file`.
+    """
+    wanted = policy.card.get("objects", [])
+    return requests_again(wanted, policy.card["objects_found_by"], str(file)) if wanted else ()
 
 
 def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, Any]:

@@ -49,6 +49,7 @@ class RunOptions:
     init_from: str | None = None
     stop_at_success: float | None = None
     videos: float = 0.0
+    objects: tuple[str, ...] = ()
 
 
 ALGORITHMS = ("sac", "ppo", "bc", "dagger")

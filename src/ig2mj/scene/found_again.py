@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -50,6 +50,30 @@ def find_again(additions: Sequence[Addition], file: str | os.PathLike) -> list[A
       InputError: a model is missing; says which, and where it was.
     """
     return [a if a.folder is None else _found(a, file) for a in additions]
+
+
+def requests_again(
+    wanted: Sequence[str], entries: Sequence[Mapping[str, Any]], file: str | os.PathLike
+) -> tuple[str, ...]:
+    """Texts of `load_scene(objects=...)` in a file, with the folders where their models are now.
+
+    Args:
+      wanted: the texts. entries: the additions that they gave, as of `entries_of`. file: see `find_again`.
+
+    Raises:
+      InputError: a model is missing, or the entries do not belong to the texts.
+    """
+    try:
+        known = [entry.addition() for entry in msgspec.convert(list(entries), list[AdditionEntry])]
+    except msgspec.ValidationError as e:
+        raise InputError(file, str(e), element="objects") from e
+    if len(known) != len(wanted):
+        raise InputError(file, f"names {len(wanted)} objects and describes {len(known)}", element="objects")
+    found = []
+    for text, was, now in zip(wanted, known, find_again(known, file), strict=True):
+        moved = was.folder is not None and now.folder is not None and text.startswith(was.folder)
+        found.append(f"{now.folder}{text.removeprefix(str(was.folder))}" if moved else text)
+    return tuple(found)
 
 
 def _found(addition: Addition, file: str | os.PathLike) -> Addition:

@@ -13,7 +13,7 @@ from ig2mj.errors import Ig2mjError
 from ig2mj.scene.additions import name_additions
 from ig2mj.scene.library import find_model
 from ig2mj.scene.manifest import load_manifest
-from ig2mj.scene.object_requests import ObjectRequest, read_request
+from ig2mj.scene.object_requests import read_request
 from ig2mj.scene.paths import scene_folder
 from ig2mj.scene.scene import Objects
 from ig2mj.tasks.homes import AnyTask
@@ -29,12 +29,12 @@ def with_objects(task: AnyTask, objects: Objects) -> AnyTask:
     Raises:
       UnknownNameError: there is no such object. Ig2mjError: a place is none.
     """
-    wanted = requests(objects)
-    if not wanted:
+    references = object_texts(objects)
+    if not references:
         return task
-    references = [canonical(request) for request in wanted]
+    wanted = [read_request(text) for text in references]
     if not isinstance(task, Task):
-        return dataclasses.replace(task, added=tuple(references))
+        return dataclasses.replace(task, added=references)
     pairs = list(zip(wanted, references, strict=True))
     bare = [text if request.predicate is None else text.rpartition("@")[0] for request, text in pairs]
     taken = (o.name for o in load_manifest(scene_folder(task.home)).objects)
@@ -47,14 +47,18 @@ def with_objects(task: AnyTask, objects: Objects) -> AnyTask:
     return dataclasses.replace(task, objects=(*task.objects, *bare), start=(*task.start, *start))
 
 
-def requests(objects: Objects) -> list[ObjectRequest]:
-    """The objects, read. Raises Ig2mjError: one of them is none."""
+def object_texts(objects: Objects) -> tuple[str, ...]:
+    """The texts of objects, folders with their whole paths.
+
+    Raises:
+      UnknownNameError: there is no such object. Ig2mjError: one of them is none.
+    """
     if not isinstance(objects, str | os.PathLike | Sequence):
         raise Ig2mjError(f"objects = {objects!r}: a folder or a name of the object library, or a list of them")
-    return [read_request(o) for o in ((objects,) if isinstance(objects, str | os.PathLike) else objects)]
+    return tuple(map(_text, (objects,) if isinstance(objects, str | os.PathLike) else objects))
 
 
-def canonical(request: ObjectRequest) -> str:
-    """The text of a request, with a folder's whole path. Raises UnknownNameError: there is no such object."""
+def _text(wanted: str | os.PathLike) -> str:
+    request = read_request(wanted)
     model = find_model(request.reference)
     return f"{model.reference}{request.text[len(request.reference) :]}" if model.named else request.text

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def with_hand(scene: Scene, folder: str | os.PathLike) -> tuple[Scene, Reach]:
-    """The scene loaded again, with a floating hand where it reaches most objects, and what it reaches.
+    """The scene loaded again with a floating hand where it reaches most objects, and what it reaches.
 
     Args:
       scene: as loaded, without agents. folder: what it was loaded from.
@@ -24,4 +24,5 @@ def with_hand(scene: Scene, folder: str | os.PathLike) -> tuple[Scene, Reach]:
     from ig2mj.scene.scene import load_scene
 
     reach = find_reach(scene)
-    return load_scene(folder, [FloatingHand(pos=reach.start)]), reach
+    objects = [addition.wanted for addition in scene.additions]
+    return load_scene(folder, [FloatingHand(pos=reach.start)], objects), reach

@@ -11,6 +11,7 @@ import tyro
 
 from ig2mj.agents.registry import ROBOTS
 from ig2mj.cli.common.deprecated import with_new_names
+from ig2mj.cli.common.objects import HELP
 from ig2mj.errors import Ig2mjError
 
 
@@ -70,9 +71,9 @@ def _with_a_usable_seed(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _with_robots(doc: str) -> str:
-    """A docstring in which `{robots}` stands for the names of robots."""
+    """A docstring in which `{robots}` stands for the names of robots, and `{object}` for what `--object` takes."""
     *names, last = ROBOTS
-    return doc.replace("{robots}", f"{', '.join(names)} or {last}")
+    return doc.replace("{robots}", f"{', '.join(names)} or {last}").replace("{object}", HELP)
 
 
 def _unfolded(doc: str) -> str:

@@ -19,19 +19,22 @@ def started(
     seconds: float,
     settings: Sequence[str],
     check: Callable[[Simulation], object] = lambda world: None,
+    objects: Sequence[str] = (),
 ) -> Simulation:
     """The scene's world after `settings` ("STATE=OBJECT" or "STATE=OBJECT=VALUE") and `seconds`.
 
     Args:
       check: of the other arguments of a command; raises before anything is set or simulated.
+      objects: what is added to the home (`load_home`).
     """
     if not math.isfinite(seconds) or seconds < 0:
         raise Ig2mjError("--seconds must be finite and not negative")
     parsed = [_parsed(setting) for setting in settings]
+    from ig2mj.cli.common.objects import load_home
     from ig2mj.simulation import Simulation
     from ig2mj.states.options import StateOptions
 
-    world = Simulation(scene, states=StateOptions(compat=compat))
+    world = Simulation(load_home(scene, objects), states=StateOptions(compat=compat))
     check(world)
     for name, name_of_object, value in parsed:
         world.set_state(name, name_of_object, value)

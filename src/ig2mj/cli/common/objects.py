@@ -1,0 +1,49 @@
+"""The option `--object` of every command that loads a home, several times: what is added to it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+if TYPE_CHECKING:
+    from ig2mj.scene.scene import Agent, Scene
+
+AddedObjects = Annotated[
+    tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="DIR|NAME[@PLACE]", help_behavior_hint="")
+]
+"""Type of the parameter `object`; `{object}` in a docstring stands for `HELP`."""
+
+HELP = (
+    "add an object, several times: a folder that `ig2mj convert object` wrote, or a name of the object library "
+    "(`ig2mj objects list`), with the place where it starts: obj/mug@on_top:breakfast_table_0, or obj/mug@1,2,0.8,90 "
+    "(metres, degrees); docs/guide/objects.md"
+)
+
+
+def load_home(scene: str | os.PathLike, objects: Sequence[str] = (), agents: Sequence[Agent] = ()) -> Scene:
+    """`load_scene`; says on stderr which objects were given no place. Raises as `load_scene`."""
+    from ig2mj.scene.scene import load_scene
+
+    loaded = load_scene(scene, agents, objects)
+    note_absent(loaded, objects)
+    return loaded
+
+
+def note_absent(scene: Scene, objects: Sequence[str]) -> None:
+    """Says on stderr which of the objects of a command line stand outside the house, and how to place them."""
+    from ig2mj.scene.object_requests import read_request
+
+    given = scene.additions[-len(objects) :] if objects else ()
+    absent = [(a, text) for a, text in zip(given, objects, strict=True) if a.place is None and a.start is None]
+    for addition, text in absent:
+        if read_request(text).predicate is not None:
+            continue  # a condition of the start states places it
+        print(
+            f"note: {addition.name} stands outside the house until it is put somewhere; to start in it: "
+            f"--object {text}@on_top:OBJECT, or {text}@X,Y,Z,DEGREES",
+            file=sys.stderr,
+        )
