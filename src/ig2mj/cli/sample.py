@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ig2mj.cli.common.deprecated import renamed_options
 from ig2mj.cli.common.jobs import Cluster, Resume, where_of
 from ig2mj.cli.common.objects import AddedObjects
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from ig2mj.cluster.job_runner import Where
 
 
+@renamed_options({"--add": "--object *"})
 def run(
     scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
     conditions: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="CONDITION")] = (),
@@ -24,7 +26,6 @@ def run(
     cluster: Cluster = None,
     resume: Resume = False,
     object: AddedObjects = (),
-    add: Annotated[tuple[str, ...], tyro.conf.Suppress] = (),
     disturb: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     share: float = 0.3,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
@@ -45,16 +46,12 @@ def run(
       cluster: run on a Ray cluster: its address, or auto.
       resume: continue an interrupted run.
       object: {object}.
-      add: old name of --object.
       disturb: instead of conditions: shift, turn and drop loose objects at random.
       share: with --disturb: probability that a loose object is moved.
       json: print the result as JSON.
     """
-    import sys
-
     from ig2mj.cli.common.files import check_output
     from ig2mj.errors import Ig2mjError
-    from ig2mj.process.deprecation import rename_text
     from ig2mj.scene.scene import load_scene
 
     if count < 1:
@@ -68,9 +65,7 @@ def run(
     file = out or pathlib.Path("pool.npz")
     check_output(file)
     where = where_of(jobs, cluster, resume)
-    if add:
-        print(f"ig2mj sample: {rename_text('--add', '--object')}", file=sys.stderr)
-    loaded = load_scene(scene, objects=(*add, *object))
+    loaded = load_scene(scene, objects=object)
     if disturb:
         return _disturb(loaded, count, file, seed, share, where)
     return _sample(loaded, conditions, count, file, seed, where, json)

@@ -5,8 +5,9 @@ A function of the command line names the options that were renamed:
     @renamed_options({"--drawn": "--stochastic", "--mixed": "--set augment_starts="})
     def run(stochastic: bool = False, set: tuple[str, ...] = ()) -> int: ...
 
-An option that became a setting is written "--set NAME=" if it has a value (`--mixed 4` is then
-`--set augment_starts=4`), and "--set NAME=true" if it is a flag. A module names sub-commands that were renamed in
+An option that took several values, and is now given several times, is written "--NEW *". An option that became a
+setting is written "--set NAME=" if it has a value (`--mixed 4` is then `--set augment_starts=4`), and "--set NAME=true"
+if it is a flag. A module names sub-commands that were renamed in
 `RENAMED = {"pictures": "images"}`, next to its `SUBCOMMANDS`. Help lists the new names only; each old name
 that is typed prints one line on stderr.
 """
@@ -23,6 +24,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _ATTRIBUTE = "renamed_options"
 _SET = "--set "
+_EACH = " *"
 
 
 def renamed_options(names: Mapping[str, str]) -> Callable[[F], F]:
@@ -52,7 +54,13 @@ def with_new_names(function: Callable[..., Any], prog: str, args: Sequence[str])
         if new is None:
             out.append(word)
             continue
-        _warn(prog, option, new)
+        _warn(prog, option, new.removesuffix(_EACH))
+        if new.endswith(_EACH):
+            values = [value] if equals else []
+            while not equals and waiting and not waiting[0].startswith("--"):
+                values.append(waiting.pop(0))
+            out += [word for each in values for word in (new.removesuffix(_EACH), each)]
+            continue
         if not new.startswith(_SET):
             out.append(new + equals + value)
             continue
