@@ -42,6 +42,7 @@ def convert_object(
     model: str | None = None,
     bounding_box: tuple[float, float, float] | None = None,
     fixed: bool = False,
+    annotations: Path | None = None,
     options: ConvertOptions | None = None,
 ) -> ConversionOutcome:
     """As `convert_object.convert_object`, with the cache of finished outputs before it."""
@@ -50,12 +51,15 @@ def convert_object(
     def work() -> ConversionOutcome:
         from .convert_object import convert_object as convert
 
-        return convert(urdf, category, out, model=model, bounding_box=bounding_box, fixed=fixed, options=options)
+        how = {"model": model, "bounding_box": bounding_box, "fixed": fixed, "annotations": annotations}
+        return convert(urdf, category, out, **how, options=options)
 
     box = None if bounding_box is None else [float(v) for v in bounding_box]
     request = {"kind": "object", "urdf": _absolute(urdf), "category": category, "model": model, "box": box}
     if fixed:
         request["fixed"] = True
+    if annotations is not None:
+        request["annotations"] = _absolute(annotations)
     return _done(request, out, options, work)
 
 

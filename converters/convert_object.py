@@ -36,6 +36,7 @@ from .mjcf.object import add_object
 from .mjcf.parking import CLEARANCE, resting_pose
 from .mjcf.scene import SceneBuild, add_start_key, rest_start
 from .model_task import BuiltModel, build_model, decompose_model
+from .reading.annotations import Annotations, annotate, annotation_warnings, read_annotations
 from .reading.dataset import Dataset
 from .reading.metadata import read_metadata
 from .reading.scaling import scale_model
@@ -51,6 +52,7 @@ def convert_object(
     model: str | None = None,
     bounding_box: tuple[float, float, float] | None = None,
     fixed: bool = False,
+    annotations: str | os.PathLike | None = None,
     options: ConvertOptions | None = None,
 ) -> ConversionOutcome:
     """Converts one object: `object.xml`, `manifest.json`, `meshes/`, and the report.
@@ -63,6 +65,8 @@ def convert_object(
       category: what it is, in iGibson's names: decides its abilities. "agent" is a robot: `robot.json` is written, too.
       model: its name, default the file's; a robot's is the one that its URDF gives.
       bounding_box: wanted size in base axes, m; default the size it has.
+      fixed: it is furniture, and stands where it is put for good.
+      annotations: TOML file with abilities and functional parts (`reading.annotations`).
 
     Raises:
       InputError: naming the file and the element.
@@ -71,7 +75,8 @@ def convert_object(
     file = pathlib.Path(urdf)
     start = time.perf_counter()
     options.progress(0, 2, f"reading {file.name}")
-    source, dataset = _read(file, category, model, options)
+    marks = None if annotations is None else read_annotations(pathlib.Path(annotations))
+    source, dataset = _read(file, category, model, options, marks)
     built = {source.model: _build(source, dataset, _scale(source, bounding_box), options)}
     built |= _halves(dataset, built[source.model], options)
     read_seconds = time.perf_counter() - start
@@ -100,9 +105,9 @@ def convert_object(
 
 
 def _read(
-    file: pathlib.Path, category: str, model: str | None, options: ConvertOptions
+    file: pathlib.Path, category: str, model: str | None, options: ConvertOptions, marks: Annotations | None
 ) -> tuple[ObjectModel, Dataset | None]:
-    """Reads the URDF, its metadata, and the dataset it lies in, if it does."""
+    """Reads the URDF, its metadata, and the dataset it lies in, if it does. `marks`: annotations that it gets."""
     if not inputs.is_file(file):
         raise InputError(file, "is not a file", element="--urdf", fix="name an object's URDF")
     name = model or file.stem
@@ -114,12 +119,16 @@ def _read(
     if category == ROBOT_CATEGORY:
         source.model = model or file_slug(source.title or name)
         put_on_floating_base(source)
-    elif knowledge.synset(category) is None:
+    elif knowledge.synset(category) is None and not (marks and marks.abilities):
         near = difflib.get_close_matches(category, knowledge.categories(), n=3, cutoff=0.6)
         hint = f"; near matches: {', '.join(near)}" if near else ""
         source.warnings.append(f"--category {shortened(category)} is not known, so the object gets no abilities{hint}")
     prepared = inputs.is_folder(file.parent / "misc")
     source.metadata = read_metadata(file.parent, source.warnings if prepared else [])
+    if marks is not None:
+        annotate(source, marks)
+        box = model_bounds(scale_model(source, 1.0))
+        source.warnings += [] if box is None else annotation_warnings(source, *box)
     return source, None if root is None else Dataset(root)
 
 

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ig2mj.knowledge.overrides import Changes
+
 ROBOT_CATEGORY = "agent"
 """iGibson's category of robots, which are no objects of the household: no synset has it."""
 
@@ -164,6 +166,7 @@ class ObjectModel:
     """An object's URDF, parsed and checked: a tree of links (a forest once floating joints are cut).
 
     title: the name that the URDF gives itself, or ''.
+    abilities: changes of what its category can do (`ig2mj.knowledge.overrides`), of a file of annotations.
     """
 
     category: str
@@ -175,6 +178,7 @@ class ObjectModel:
     metadata: Metadata = dataclasses.field(default_factory=Metadata)
     warnings: list[str] = dataclasses.field(default_factory=list)
     title: str = ""
+    abilities: Changes = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass

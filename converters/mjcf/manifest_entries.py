@@ -10,7 +10,7 @@ import numpy as np
 from ig2mj import knowledge
 from ig2mj.scene.manifest import JointEntry, ObjectEntry, OpenableEntry, OrientationEntry, PartEntry, RoomEntry, Vec3
 
-from ..base.description import RoomMaps
+from ..base.description import ObjectModel, RoomMaps
 from ..bodies.assembly import Assembly, extent
 from ..bodies.joint_limits import joint_range, mujoco_type
 from ..bodies.joint_rules import openable_ends
@@ -56,7 +56,7 @@ def object_entry(
         openable=[OpenableEntry(joint=elements.joints[j], closed=closed, open=open_) for j, closed, open_ in ends],
         openable_both_sides=model.metadata.openable_both_sides,
         links=elements.links,
-        abilities=knowledge.abilities(model.category, model.model),
+        abilities=_abilities(model),
         orientations=_orientations(assembly),
         parts=[PartEntry(object=half, pos=vec3(pos), quat=_quat(quat)) for half, pos, quat in parts or []],
         part_of=part_of,
@@ -64,6 +64,11 @@ def object_entry(
         assisted_grasp=assisted_grasp,
         object_scope=scope,
     )
+
+
+def _abilities(model: ObjectModel) -> knowledge.Abilities:
+    own = knowledge.Overrides(models={f"{model.category}/{model.model}": model.abilities}) if model.abilities else None
+    return knowledge.abilities(model.category, model.model, overrides=own)
 
 
 def bounding_box(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:

@@ -76,19 +76,25 @@ def convert_object(
     out: pathlib.Path,
     model: str | None = None,
     bbox: tuple[float, float, float] | None = None,
+    fixed: Flag = False,
+    annotations: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     mesh_root: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None,
     package_path: Annotated[tuple[pathlib.Path, ...], tyro.conf.arg(metavar="DIR")] = (),
     common: Annotated[Common, tyro.conf.OmitArgPrefixes] = DEFAULTS,
 ) -> int:
     """Convert one URDF object, iGibson's or any other: OUT/object.xml, manifest.json, meshes/, report.html.
 
-    Exit status: 0 converted; 2 bad input, one line on stderr.
+    `ig2mj view small_home --object OUT@on_top:breakfast_table_0` puts it into a home, `ig2mj objects show OUT` renders
+    it. Exit status: 0 converted; 2 bad input, one line on stderr.
 
     Args:
       urdf: the object's URDF.
       category: its category in iGibson's taxonomy (apple, fridge, ...), which decides its abilities.
       out: output folder; an earlier result there is replaced once the conversion succeeds.
       model: name of the object; default: the file's name.
+      fixed: it is furniture: in a home it stands where it is put for good, and nothing moves it.
+      annotations: TOML file with its abilities, thresholds and functional parts, such as a button or a heat source
+        (docs/guide/objects.md).
       bbox: requested size along the axes of the base link, metres; default: the size it has.
       mesh_root: additional folder from which meshes may be read (URDFs that use ../ or absolute paths).
       package_path: folders that hold the packages of `package://` names.
@@ -97,7 +103,16 @@ def convert_object(
 
     options = options_of(common, default_jobs=os.cpu_count() or 1, mesh_root=mesh_root, package_path=package_path)
     with _progress(f"converting {urdf.name}") as options_with:
-        outcome = convert(urdf, category, out, model=model, bounding_box=bbox, options=options_with(options))
+        outcome = convert(
+            urdf,
+            category,
+            out,
+            model=model,
+            bounding_box=bbox,
+            fixed=fixed,
+            annotations=annotations,
+            options=options_with(options),
+        )
     return _tell(outcome, out, "object.xml", common.json)
 
 

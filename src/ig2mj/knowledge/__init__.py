@@ -1,6 +1,7 @@
 """What a category is and can do: taxonomy, abilities, their parameters. Pure Python; needs neither JAX nor MuJoCo."""
 
 from ig2mj.knowledge.abilities import (
+    Abilities,
     abilities,
     abilities_of_synset,
     predicate,
@@ -23,6 +24,7 @@ from ig2mj.knowledge.taxonomy import (
 
 __all__ = [
     "ABILITIES",
+    "Abilities",
     "Ability",
     "Overrides",
     "abilities",

@@ -46,11 +46,12 @@ def load_overrides(path: str | os.PathLike) -> Overrides:
     tables = [overrides.categories, overrides.models, *overrides.compat.values()]
     for key, changes in ((k, c) for table in tables for k, c in table.items()):
         for ability, parameters in changes.items():
-            _check(file, f"'{key}': {ability}", ability, parameters or {})
+            check_parameters(file, f"'{key}': {ability}", ability, parameters or {})
     return overrides
 
 
-def _check(file: pathlib.Path, element: str, ability: str, parameters: Parameters) -> None:
+def check_parameters(file: pathlib.Path, element: str, ability: str, parameters: Parameters) -> None:
+    """Raises InputError: no such ability, or a parameter that it does not have or that is of another type."""
     if ability not in ABILITIES:
         raise InputError(
             file, "is not an ability", element=element, fix=f"abilities are {', '.join(sorted(ABILITIES))}"

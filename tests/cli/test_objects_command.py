@@ -1,0 +1,86 @@
+"""`ig2mj objects`, and `--object` of the commands that load a home."""
+
+import importlib
+import json
+import typing
+
+import pytest
+
+from ig2mj import cli
+from ig2mj.cli.common.objects import AddedObjects
+
+pytestmark = pytest.mark.usefixtures("own_configuration")
+
+COMMANDS = (
+    *("view", "web", "inspect", "states", "predicates", "calibrate", "warm_up", "sample", "sample_task"),
+    *("play", "rollout", "train", "evaluate", "vr"),
+)
+
+
+def call(capsys, *words):
+    status = cli.call([str(word) for word in words])
+    found = capsys.readouterr()
+    return status, found.out, found.err
+
+
+def test_a_library_is_added_listed_and_removed(capsys, cup):
+    status, out, _ = call(capsys, "objects", "add", cup.parent)
+    assert status == 0 and "1 object (mug/cup)" in out and "--object mug/cup@on_top:" in out
+    status, out, _ = call(capsys, "objects", "list", "--own", "--json")
+    (found,) = json.loads(out)
+    assert found["name"] == "mug/cup" and found["own"] and not found["fixed"] and found["bottom"] == 0.04
+    status, out, _ = call(capsys, "objects", "list", "stainable", "--own")
+    assert status == 0 and "mug/cup" in out
+    assert call(capsys, "objects", "list", "nothing_like_it")[0] == 1
+    assert call(capsys, "objects", "remove", cup.parent)[0] == 0
+    assert json.loads(call(capsys, "objects", "list", "--own", "--json")[1]) == []
+
+
+def test_a_library_whose_names_clash_is_not_kept(capsys, cup, tmp_path):
+    import shutil
+
+    for name in ("one", "two"):
+        shutil.copytree(cup, tmp_path / "library" / name)
+    status, _, err = call(capsys, "objects", "add", tmp_path / "library")
+    assert status == 2 and "is 'mug/cup', as is" in err and err.count("\n") == 1
+    assert call(capsys, "objects", "list", "--own")[1].startswith("no objects")
+
+
+def test_an_object_is_shown_with_its_abilities(capsys, cup):
+    status, out, _ = call(capsys, "objects", "show", cup, "--json")
+    found = json.loads(out)
+    assert status == 0 and found["category"] == "mug" and found["name"] == str(cup)
+    assert found["abilities"]["stainable"] == {"stained_threshold": 0.5}
+
+
+@pytest.mark.parametrize("wanted", ["mgu", "obj/nothing", "mug/mug_99"])
+def test_an_object_that_does_not_exist_is_one_line_with_both_readings(capsys, wanted):
+    status, _, err = call(capsys, "objects", "show", wanted)
+    assert status == 2 and err.count("\n") == 1 and "object library" in err and "manifest.json" in err
+
+
+def test_every_command_that_loads_a_home_takes_objects():
+    for name in COMMANDS:
+        function = importlib.import_module(f"ig2mj.cli.{name}").run
+        hints = typing.get_type_hints(function, include_extras=True)
+        assert "object" in hints, name
+        assert name == "states" or hints["object"] == AddedObjects, name
+    from ig2mj.cli.demos import collect
+
+    assert typing.get_type_hints(collect, include_extras=True)["object"] == AddedObjects
+
+
+def test_objects_are_given_several_times_and_one_without_a_place_is_reported(capsys, tiny_home_folder, cup):
+    words = ["inspect", tiny_home_folder, "--object", cup, "--object", f"{cup}@0,0,1,0", "--show", "objects", "--json"]
+    status, out, err = call(capsys, *words)
+    names = [o["name"] for o in json.loads(out)["objects"]]
+    assert status == 0 and names[-2:] == ["cup_0", "cup_1"]
+    assert err.count("note: ") == 1 and "cup_0 stands outside the house" in err and "@on_top:" in err
+
+
+def test_states_still_takes_names_of_the_homes_objects(capsys, tiny_home_folder, cup):
+    status, out, err = call(
+        capsys, "states", tiny_home_folder, "--object", "can", "box", "--object", f"{cup}@0,0,1,0", "--json"
+    )
+    assert status == 0 and set(json.loads(out)["objects"]) == {"can", "box"}
+    assert "'--object can' is now '--only can'" in err
