@@ -16,6 +16,8 @@ AIR = 0.0008
 """m, kept between an object and what it stands on: it settles by less than the converter's 5 mm."""
 FLAT = ("carpet", "mat")
 """Categories that are walked and driven over: they need no air around them and block no way."""
+WAY = "way"
+"""Owner of the zones on both sides of doors and passages."""
 
 
 class Arrangement:
@@ -40,6 +42,14 @@ class Arrangement:
         other._solid, other._swept = _Groups(self._solid.groups), _Groups(self._swept.groups)
         other._ways = list(self._ways)
         return other
+
+    def rename(self, thing: Placed, name: str) -> None:
+        """Gives an object that stands here another name."""
+        old, thing.name = thing.name, name
+        self.things = {other.name: other for other in self.things.values()}
+        self._ways = [(name if owner == old else owner, zone) for owner, zone in self._ways]
+        for other in self.things.values():
+            other.host = name if other.host == old else other.host
 
     def name(self, category: str) -> str:
         """The next free name of a category: fridge_0, fridge_1, ..."""
@@ -69,19 +79,28 @@ class Arrangement:
           gap: metres of air wanted between it and other things, box of hull against box of hull.
           ways: mind zones that are kept free, too.
         """
+        return not self.obstacle(thing, ignore=ignore, gap=gap, ways=ways)
+
+    def obstacle(self, thing: Placed, *, ignore: Iterable[str] = (), gap: float = 0.0, ways: bool = True) -> str:
+        """Why an object does not fit, as the end of a sentence about it, or ''. Arguments as of `fits`."""
         mine = _Group(thing, thing.parts())
         ignored = {*ignore, thing.name, thing.host}
-        if ways and any(owner not in ignored and _overlaps(mine.boxes, zone).any() for owner, zone in self._ways):
-            return False
-        if any(mine.meets(other, 0.0 if other.low_lying else gap) for other in self._solid.near(mine, gap)):
-            return False
+        if ways:
+            for owner, zone in self._ways:
+                if owner not in ignored and _overlaps(mine.boxes, zone).any():
+                    return "stands in the way through a door or a passage" if owner == WAY else f"stands before {owner}"
+        for other in self._solid.near(mine, gap):
+            if mine.meets(other, 0.0 if other.low_lying else gap):
+                return f"overlaps {other.name or 'a wall'}" if gap == 0 else f"is too near to {other.name or 'a wall'}"
         for other in self._swept.near(mine):
             if other.name not in ignored and mine.meets(other):
-                return False
-        if not thing.shape.swept:
-            return True
-        moving = _Group(thing, thing.swept())
-        return not any(moving.meets(o) for o in self._solid.near(moving))
+                return f"stands where {other.name} opens"
+        if thing.shape.swept:
+            moving = _Group(thing, thing.swept())
+            for other in self._solid.near(moving):
+                if moving.meets(other):
+                    return f"cannot open: {other.name or 'a wall'} is in the way"
+        return ""
 
     def free(self, zone: np.ndarray) -> bool:
         """Whether nothing but a carpet lies in a box [2, 3]."""

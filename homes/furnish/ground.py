@@ -48,8 +48,12 @@ class Ground:
 
     def allows(self, thing: Placed) -> bool:
         """Whether every room and doorway can still be reached with this object in its place."""
+        return not self.cut_off(thing)
+
+    def cut_off(self, thing: Placed) -> str:
+        """The first room or doorway that cannot be reached with this object in its place, or ''."""
         after = self._without(thing)
-        return after is None or self._sound(after)
+        return "" if after is None else self._unreachable(after)
 
     def occupy(self, thing: Placed) -> None:
         """Takes an object's floor away."""
@@ -66,15 +70,15 @@ class Ground:
                 after[self._outer_cells((low[0], low[1], high[0], high[1]))] = False
         return None if np.array_equal(after, self.free) else after
 
-    def _sound(self, free: np.ndarray) -> bool:
+    def _unreachable(self, free: np.ndarray) -> str:
         reach = reachable(free, RADIUS, CELL)
         if not all(reach[gate] for gate in self._gates):
-            return False
+            return "a doorway"
         for name, cells in self._rooms.items():
             need = max(LEAST_AREA, min(LEAST_SHARE * self._area[name], 1.2))
             if reach[cells].sum() * CELL**2 < need:
-                return False
-        return True
+                return name
+        return ""
 
     def _cell(self, v: float) -> int:
         return int(np.floor(v / CELL)) + self._half

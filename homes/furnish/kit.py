@@ -37,6 +37,7 @@ class RoomKit(LooseKit):
         *,
         side: str | Sequence[str] | None = None,
         near: tuple[float, float] | None = None,
+        at: float | None = None,
         place: str = "any",
         index: int | None = None,
         height: float = 0.0,
@@ -51,7 +52,8 @@ class RoomKit(LooseKit):
 
         Args:
           side: "south", "east", ... or several to be tried in that order; None: all, in random order.
-          near: x, y that it shall be close to; otherwise place: "corner", "middle" or "any".
+          near: x, y that it shall be close to; at: x or y of its middle, exactly; otherwise place: "corner", "middle"
+            or "any".
           height: of its lower edge above the floor. room_before: metres of floor kept free before it.
           gap, wall_gap: metres of air to other furniture (default: little, none for what hangs), and behind it.
           under_window: False for what may not stand before a window even where it is lower.
@@ -62,13 +64,14 @@ class RoomKit(LooseKit):
         sides = [side] if isinstance(side, str) else list(side or self.shuffled(list(SIDES)))
         form = self.shape(category, index)
         for name in sides:
-            for at in self._along(name, form.size[1], place, near)[:most]:
+            for spot in [at] if at is not None else self._along(name, form.size[1], place, near)[:most]:
                 turn = yaw(DEGREES[name])
                 back = wall_gap if height == 0 else FLAT_ON_WALL
-                position = self._against(name, at, -form.low[0] + back, -(form.low[1] + form.high[1]) / 2, turn)
+                position = self._against(name, spot, -form.low[0] + back, -(form.low[1] + form.high[1]) / 2, turn)
                 position[2] = height - form.low[2] + (0 if (height or find(category).fixed) else AIR)
                 thing = self.thing(category, index, position, turn, fixed)
                 if self._before_window(thing, name, under_window):
+                    self.problem = self.problem or "stands before a window"
                     continue
                 if self._stand(thing, gap, room_before):
                     return thing
@@ -106,7 +109,10 @@ class RoomKit(LooseKit):
             (low, high), (least, most) = thing.box(), carpet.box()
             if np.any(low[:2] < least[:2]) or np.any(high[:2] > most[:2]):
                 return None
-        return thing if self._inside(thing) and self._stand(thing, gap, room_before, ways) else None
+        if not self._inside(thing):
+            self.problem = self.problem or f"reaches beyond the walls of {self.room.name}"
+            return None
+        return thing if self._stand(thing, gap, room_before, ways) else None
 
     def spread(
         self, middle: tuple[float, float], degrees: float, most: tuple[float, float], category: str = "carpet"
@@ -210,7 +216,8 @@ class RoomKit(LooseKit):
     def _stand(self, thing: Placed, gap: float, room_before: float, ways: bool = True) -> bool:
         """Puts furniture where it is if all is well; then its name is set."""
         things = self.home.things
-        if not things.fits(thing, gap=gap, ways=ways and thing.category not in FLAT):
+        if problem := things.obstacle(thing, gap=gap, ways=ways and thing.category not in FLAT):
+            self.problem = self.problem or problem
             return False
         zone = None
         if room_before > 0:
@@ -219,8 +226,10 @@ class RoomKit(LooseKit):
             inside = low[0] > self.rect[0] - 0.01 and low[1] > self.rect[1] - 0.01
             inside = inside and high[0] < self.rect[2] + 0.01 and high[1] < self.rect[3] + 0.01
             if not inside or not things.free(zone):
+                self.problem = self.problem or f"has less than {room_before:g} m of free floor before it"
                 return False
-        if not self.home.ground.allows(thing):
+        if lost := self.home.ground.cut_off(thing):
+            self.problem = self.problem or f"leaves a robot no way to {lost}"
             return False
         thing.name = things.name(thing.category)
         things.put(thing)

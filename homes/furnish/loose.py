@@ -61,10 +61,15 @@ class LooseKit(RoomBase):
                 middle = local.mean(0)
                 thing.position = np.array([spot[0] - middle[0], spot[1] - middle[1], spot[2] + AIR - local[0, 2]])
                 if (at is None or host.category in FLAT) and not _within(thing, host, surface):
+                    self.problem = self.problem or f"reaches beyond {host.name}"
                     continue
                 if surface.inside and local[1, 2] - local[0, 2] > surface.room - 0.004:
+                    self.problem = self.problem or f"is too high for {host.name}"
                     break
-                if not self.home.things.fits(thing, ignore=(host.name, host.host or ""), ways=host.category in FLAT):
+                if problem := self.home.things.obstacle(
+                    thing, ignore=(host.name, host.host or ""), ways=host.category in FLAT
+                ):
+                    self.problem = self.problem or problem
                     continue
                 if host.category in FLAT:  # what stands on a carpet stands in a robot's way
                     if not self.home.ground.allows(thing):

@@ -66,7 +66,15 @@ class HomeInProgress:
 
 
 class RoomBase:
-    """One room being furnished. rect: between its wall faces."""
+    """One room being furnished.
+
+    Attributes:
+      rect: between its wall faces.
+      problem: why the first place that was tried was no good, as the end of a sentence about the object; ''. Callers
+        that report it clear it before.
+    """
+
+    problem = ""
 
     def __init__(self, home: HomeInProgress, room: Room):
         self.home, self.room = home, room

@@ -8,31 +8,44 @@ import numpy as np
 
 from ..plans.building import stair_boxes, wall_boxes
 from ..plans.openings import opening_things
-from ..plans.plan import Plan
+from ..plans.plan import Opening, Plan
 from ..plans.porch import front_door, porch_rails
-from .arrangement import AIR, Arrangement
+from .arrangement import AIR, WAY, Arrangement
 from .ground import Ground
 from .placed import Placed, yaw
 from .room import HomeInProgress
 
-WAY = 0.75  # m, kept free on both sides of a door
+WAY_DEPTH = 0.75  # m, kept free on both sides of a door
 DOORMAT_AT = 0.45  # m, from the front door's wall to the middle of the mat
+
+
+class NoRoomToOpen(Exception):
+    """A door or a window that does not fit into its opening, or cannot open.
+
+    Attributes:
+      opening: where it is. problem: what is in the way, as the end of a sentence.
+    """
+
+    def __init__(self, plan: Plan, opening: Opening, problem: str):
+        self.opening, self.problem = opening, problem
+        super().__init__(f"{plan.name}: the {opening.kind} of {', '.join(opening.edge.rooms)} {problem}")
 
 
 def start_home(
     plan: Plan, rng: random.Random, *, models: int = 3, limit: int | None = None, seed: int = 0
 ) -> HomeInProgress:
-    """Doors and windows in their openings."""
+    """Doors and windows in their openings. Raises NoRoomToOpen."""
     things = Arrangement(np.concatenate([wall_boxes(plan), stair_boxes(plan), porch_rails(plan)]))
     for opening, thing in opening_things(plan, seed):
-        assert things.fits(thing), f"{plan.name}: the {opening.kind} between {opening.edge.rooms} has no room to open"
+        if problem := things.obstacle(thing):
+            raise NoRoomToOpen(plan, opening, problem)
         thing.name = things.name(thing.category)
         things.put(thing)
     for opening in plan.openings:
         if opening.walkable and not plan.fully_open(opening.edge):
             edge = opening.edge
-            p, q = edge.point(opening.low, -WAY), edge.point(opening.high, WAY)
-            things.keep_free("way", np.array([[[p[0], p[1], 0.02], [q[0], q[1], 2.0]]]))
+            p, q = edge.point(opening.low, -WAY_DEPTH), edge.point(opening.high, WAY_DEPTH)
+            things.keep_free(WAY, np.array([[[p[0], p[1], 0.02], [q[0], q[1], 2.0]]]))
     return HomeInProgress(plan, things, Ground(plan), rng, models=models, limit=limit, seed=seed)
 
 

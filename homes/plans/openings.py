@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator
 
 from ..furnish.placed import Placed, shape, yaw
 from ..objects.catalogue import find
-from .plan import Edge, Opening, Plan, Room, make_edges
+from .plan import HEIGHT, Edge, Opening, Plan, Room, make_edges
 
 AIR = 0.004  # m, around a door's or window's frame in its opening
 CORNER = 0.30  # m, least distance of an opening from a room's corner: a leaf that opens by 100 degrees needs it
@@ -16,6 +16,7 @@ PASSAGE_WIDTH, PASSAGE_TOP = 1.30, 2.10  # m
 SILL, COUNTER_SILL = 0.90, 1.0  # m, height of window sills; in kitchens, where cupboards stand below
 LONG = 4.0  # m of outer wall from which there are two windows in it
 LARGE = 15.0  # m2 of room from which there are windows in two walls
+DOOR_WALL = 0.95 + 2 * CORNER  # m of wall that a door needs, at least
 KNOB = 0.053  # m, by which a door's box is deeper than its frame (objects/doors_windows.py)
 
 HUBS = ("corridor", "lobby", "living_room", "dining_room", "staircase")
@@ -45,37 +46,96 @@ def make_plan(
       models: at most so many models of doors and windows are used. seed: of the models.
     """
     plan = Plan(name, rooms, make_edges(rooms))
-    kinds = {room.name: room.kind for room in rooms}
     openings: list[Opening] = []
-    joined: dict[str, str] = {room.name: room.name for room in rooms}
     for pairs, full in ((open_plan, True), (passages, False)):
         for a, b in pairs:
             edge = _shared(plan, a, b)
-            width = edge.length if full else min(PASSAGE_WIDTH, edge.length - 2 * 0.15)
-            top = 2.5 if full else PASSAGE_TOP
-            openings.append(Opening("passage", edge, (edge.low + edge.high) / 2, width, 0.0, top))
-            _join(joined, a, b)
+            openings.append(passage(edge, edge.length if full else min(PASSAGE_WIDTH, edge.length - 2 * 0.15)))
     style = rng.randrange(min(find("door").count, models))
-    candidates = [e for e in plan.edges if not e.outer and e.length >= 0.95 + 2 * CORNER]
+    openings += doors(plan, openings, style, rng, seed)
+    apart = unjoined(plan, openings)
+    assert not apart, f"{name}: rooms without a way in: {apart}"
+    openings += front_doors(plan, front, style, models, rng, seed)
+    pane = rng.randrange(min(find("window").count, models))
+    openings += windows(plan, openings, pane, seed)
+    return dataclasses.replace(plan, openings=tuple(openings))
+
+
+def passage(edge: Edge, width: float, centre: float | None = None) -> Opening:
+    """A way without a door, or with no wall at all where it is as wide as the edge. centre: default, the edge's."""
+    top = HEIGHT if width >= edge.length - 1e-6 else PASSAGE_TOP
+    return Opening("passage", edge, (edge.low + edge.high) / 2 if centre is None else centre, width, 0.0, top)
+
+
+def door(edge: Edge, index: int, into: str, centre: float | None = None, seed: int = 0) -> Opening:
+    """A door of the catalogue. into: the room that it opens into. centre: default, the edge's."""
+    _, width, height = shape("door", index, seed).size
+    width = float(width) + AIR
+    middle = (edge.low + edge.high) / 2 if centre is None else centre
+    return Opening("door", edge, middle, width, 0.0, float(height) + AIR, index, into)
+
+
+def window(plan: Plan, edge: Edge, index: int, centre: float | None = None, seed: int = 0) -> Opening:
+    """A window of the catalogue. centre: default, the edge's."""
+    room = plan.room(edge.rooms[0])
+    _, width, height = shape("window", index, seed).size
+    width, height = float(width) + AIR, float(height) + AIR
+    sill = COUNTER_SILL if room.kind == "kitchen" else SILL
+    middle = (edge.low + edge.high) / 2 if centre is None else centre
+    return Opening("window", edge, middle, width, sill, sill + height, index, room.name)
+
+
+def unjoined(plan: Plan, openings: Collection[Opening]) -> list[str]:
+    """Rooms that no way through openings joins to the first room."""
+    joined: dict[str, str] = {room.name: room.name for room in plan.rooms}
+    for opening in openings:
+        if opening.walkable and not opening.edge.outer:
+            _join(joined, *opening.edge.rooms)
+    first = _root(joined, plan.rooms[0].name)
+    return [room.name for room in plan.rooms if _root(joined, room.name) != first]
+
+
+def doors(plan: Plan, openings: Collection[Opening], style: int, rng: random.Random, seed: int) -> list[Opening]:
+    """Doors between rooms that no opening joins."""
+    kinds = {room.name: room.kind for room in plan.rooms}
+    joined: dict[str, str] = {room.name: room.name for room in plan.rooms}
+    for opening in openings:
+        _join(joined, *opening.edge.rooms)
+    found = []
+    candidates = [e for e in plan.edges if not e.outer and e.length >= DOOR_WALL]
     candidates.sort(key=lambda e: (_cost(e.before or "", e.after or "", kinds), -e.length, e.at, e.low))
     for edge in candidates:
         a, b = edge.rooms
         if _root(joined, a) != _root(joined, b):
-            openings.append(_door(edge, style, _into(plan, edge), rng, seed))
+            found.append(_door(edge, style, opens_into(plan, edge), rng, seed))
             _join(joined, a, b)
-    roots = {_root(joined, room.name) for room in rooms}
-    assert len(roots) == 1, f"{name}: rooms without a way in: {sorted(roots)}"
-    outer = [e for e in plan.edges if e.outer and e.length >= 0.95 + 2 * CORNER and kinds[e.rooms[0]] != "balcony"]
+    return found
+
+
+def front_doors(
+    plan: Plan, front: str | None, style: int, models: int, rng: random.Random, seed: int = 0
+) -> list[Opening]:
+    """The front door; empty where no outer wall is long enough. front: its room; None: the best hub."""
+    kinds = {room.name: room.kind for room in plan.rooms}
+    outer = _outer_walls(plan)
     entrances = [e for e in outer if e.rooms[0] == front] if front else sorted(
         outer, key=lambda e: (("lobby", "corridor", "living_room", "kitchen").index(kinds[e.rooms[0]])
                               if kinds[e.rooms[0]] in ("lobby", "corridor", "living_room", "kitchen") else 9,
                               e.length))  # fmt: skip
-    entrance = entrances[0]
-    openings.append(_door(entrance, (style + 1) % models, entrance.rooms[0], rng, seed))
-    pane = rng.randrange(min(find("window").count, models))
-    for room in rooms:
-        openings += _windows(room, [e for e in outer if e.rooms[0] == room.name], pane, openings, seed)
-    return dataclasses.replace(plan, openings=tuple(openings))
+    return [_door(edge, (style + 1) % models, edge.rooms[0], rng, seed) for edge in entrances[:1]]
+
+
+def windows(plan: Plan, openings: Collection[Opening], pane: int, seed: int = 0) -> list[Opening]:
+    """Windows of all rooms that have daylight, where no other opening is. pane: number of the model."""
+    found, outer = list(openings), _outer_walls(plan)
+    for room in plan.rooms:
+        found += _windows(plan, room, [e for e in outer if e.rooms[0] == room.name], pane, found, seed)
+    return found[len(openings) :]
+
+
+def _outer_walls(plan: Plan) -> list[Edge]:
+    """Outer walls of rooms with a roof that are long enough for a door."""
+    return [e for e in plan.edges if e.outer and e.length >= DOOR_WALL and plan.room(e.rooms[0]).kind != "balcony"]
 
 
 def opening_things(plan: Plan, seed: int = 0) -> Iterator[tuple[Opening, Placed]]:
@@ -114,7 +174,7 @@ def _cost(first: str, second: str, kinds: dict[str, str]) -> int:
     return 6 - 2 * hubs + 3 * private
 
 
-def _into(plan: Plan, edge: Edge) -> str:
+def opens_into(plan: Plan, edge: Edge) -> str:
     """The room that a door opens into: the private one of two, unless it is too narrow for the leaf."""
     a, b = (plan.room(name) for name in edge.rooms)
 
@@ -126,19 +186,17 @@ def _into(plan: Plan, edge: Edge) -> str:
 
 
 def _door(edge: Edge, index: int, into: str, rng: random.Random, seed: int) -> Opening:
-    _, width, height = shape("door", index, seed).size
-    width = float(width) + AIR
+    width = float(shape("door", index, seed).size[1]) + AIR
     low, high = edge.low + CORNER + width / 2, edge.high - CORNER - width / 2
     centre = rng.choice((low, high)) if high > low else (low + high) / 2
-    return Opening("door", edge, centre, width, 0.0, float(height) + AIR, index, into)
+    return door(edge, index, into, centre, seed)
 
 
-def _windows(room: Room, edges: list[Edge], index: int, taken: list[Opening], seed: int) -> list[Opening]:
+def _windows(plan: Plan, room: Room, edges: list[Edge], index: int, taken: list[Opening], seed: int) -> list[Opening]:
     """A room's windows: in its longest outer wall, and in the next one where the room is large."""
     if room.kind in DARK or room.kind == "balcony":
         return []
-    _, width, height = shape("window", index, seed).size
-    width, height = float(width) + AIR, float(height) + AIR
+    width = float(shape("window", index, seed).size[1]) + AIR
     found = []
     walls = 2 if room.area > LARGE and room.kind != "kitchen" else 1
     order = 1 if room.kind == "kitchen" else -1  # a kitchen's longest wall is for its counter
@@ -150,8 +208,7 @@ def _windows(room: Room, edges: list[Edge], index: int, taken: list[Opening], se
             centre = edge.low + edge.length * (k + 0.5) / count
             low, high = centre - width / 2 - 0.25, centre + width / 2 + 0.25
             if all(o.edge != edge or o.high < low or o.low > high for o in taken):
-                sill = COUNTER_SILL if room.kind == "kitchen" else SILL
-                found.append(Opening("window", edge, centre, width, sill, sill + height, index, room.name))
+                found.append(window(plan, edge, index, centre, seed))
     return found
 
 
