@@ -92,7 +92,14 @@ GUESTS = {
         "ig2mj.files",
         "ig2mj.callbacks",
     ),
-    "homes": ("ig2mj.knowledge", "ig2mj.errors", "ig2mj.install_hint", "ig2mj.callbacks"),
+    "homes": (
+        "ig2mj.knowledge",
+        "ig2mj.scene.manifest",
+        "ig2mj.errors",
+        "ig2mj.install_hint",
+        "ig2mj.files",
+        "ig2mj.callbacks",
+    ),
 }
 GUEST_NAMES = {"ig2mj_converters", "ig2mj_homes"}
 

@@ -10,7 +10,7 @@ import json
 import multiprocessing
 import pathlib
 import shutil
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 
 from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.errors import UnknownNameError
@@ -70,6 +70,22 @@ def build_dataset(
     write_metadata(out, entries, sizes)
     write_material_library(out, seed)
     return {category: len(found) for category, found in sizes.items()}
+
+
+def write_models(out: pathlib.Path, wanted: Mapping[str, Collection[int]], seed: int = 0) -> None:
+    """Writes some models of some categories, in this process, with metadata as for all models of these categories.
+
+    Args:
+      wanted: category -> numbers of models.
+    """
+    entries = _chosen(wanted)
+    sizes: dict[str, list[list[float]]] = {}
+    for entry in entries:
+        models = [build_model(entry, index, seed) for index in range(entry.count)]
+        sizes[entry.category] = [[float(v) for v in high - low] for low, high in (model.bounds() for model in models)]
+        for index in sorted(set(wanted[entry.category])):
+            write_model(models[index], out / "objects")
+    write_metadata(out, entries, sizes)
 
 
 def write_metadata(out: pathlib.Path, entries: list[Entry], sizes: dict[str, list[list[float]]]) -> None:

@@ -6,6 +6,7 @@ import json
 import pathlib
 import random
 import shutil
+from collections.abc import Collection
 from xml.sax.saxutils import quoteattr
 
 from ..furnish.arrangement import Arrangement
@@ -20,13 +21,20 @@ VARIANTS = ("", "_best")
 """Scene files with the same contents; the loader takes `_best` first."""
 
 
-def write_scene(root: pathlib.Path, plan: Plan, home: Arrangement, seed: int = 0) -> pathlib.Path:
-    """Writes `scenes/<name>/`: the scene URDFs, the building's parts, the maps and the list of overlapping boxes."""
+def write_scene(
+    root: pathlib.Path, plan: Plan, home: Arrangement, seed: int = 0, skipped: Collection[str] = ()
+) -> pathlib.Path:
+    """Writes `scenes/<name>/`: the scene URDFs, the building's parts, the maps and the list of overlapping boxes.
+
+    Args:
+      skipped: names of objects that are on the maps and not in the scene, since the dataset has no model of them.
+    """
     folder = root / "scenes" / plan.name
     shutil.rmtree(folder, ignore_errors=True)
     write_building(plan, folder, random.Random(f"{seed}/{plan.name}/building"))
+    listed = [thing for thing in home.things.values() if thing.name not in skipped]
     for variant in VARIANTS:
-        _text(folder / "urdf" / f"{plan.name}{variant}.urdf", scene_urdf(plan.name, list(home.things.values())))
+        _text(folder / "urdf" / f"{plan.name}{variant}.urdf", scene_urdf(plan.name, listed))
     _text(folder / "urdf" / f"{plan.name}_orig.urdf", scene_urdf(plan.name, []))
     (folder / "misc").mkdir(exist_ok=True)
     _text(folder / "misc/bbox_overlap.json", json.dumps(home.overlapping_boxes()) + "\n")

@@ -55,6 +55,10 @@ class Ground:
         after = self._without(thing)
         return "" if after is None else self._unreachable(after)
 
+    def cut_off_by(self, boxes: np.ndarray) -> str:
+        """The same with boxes [n, 2, 3] in the way."""
+        return self._unreachable(self._less(boxes))
+
     def occupy(self, thing: Placed) -> None:
         """Takes an object's floor away."""
         after = self._without(thing)
@@ -64,11 +68,15 @@ class Ground:
     def _without(self, thing: Placed) -> np.ndarray | None:
         if thing.category in (*FLAT, "door", "window"):
             return None
+        after = self._less(thing.boxes())
+        return None if np.array_equal(after, self.free) else after
+
+    def _less(self, boxes: np.ndarray) -> np.ndarray:
         after = self.free.copy()
-        for low, high in thing.boxes():
+        for low, high in boxes:
             if low[2] < HIGH and high[2] > LOW:
                 after[self._outer_cells((low[0], low[1], high[0], high[1]))] = False
-        return None if np.array_equal(after, self.free) else after
+        return after
 
     def _unreachable(self, free: np.ndarray) -> str:
         reach = reachable(free, RADIUS, CELL)

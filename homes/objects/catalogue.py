@@ -15,6 +15,7 @@ from ig2mj.errors import UnknownNameError
 
 from .entry import Entry
 from .families import FAMILIES
+from .folder_model import folder_entry, folder_model, is_folder
 from .halves import add_halves
 from .hinges import friction
 from .model import HouseholdObject, ObjectBuilder
@@ -34,7 +35,9 @@ def catalogue() -> dict[str, Entry]:
 
 
 def find(category: str) -> Entry:
-    """The entry of a category. Raises UnknownNameError."""
+    """The entry of a category, or of the folder of a converted object. Raises UnknownNameError."""
+    if is_folder(category):
+        return folder_entry(category)
     entries = catalogue()
     if category not in entries:
         raise UnknownNameError("category", category, entries)
@@ -43,6 +46,8 @@ def find(category: str) -> Entry:
 
 def build_model(entry: Entry, index: int, seed: int = 0) -> HouseholdObject:
     """The category's model number `index`, with its halves where it is sliceable. Same arguments, same model."""
+    if is_folder(entry.category):
+        return folder_model(entry.category).model
     rng = random.Random(f"{seed}/{entry.category}/{index}")
     if entry.uniform:
         factor = rng.uniform(1 - entry.vary, 1 + entry.vary)
