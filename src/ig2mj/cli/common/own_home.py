@@ -1,0 +1,257 @@
+"""`make_home`: the TOML of a home becomes a folder that loads everywhere a home does.
+
+Rooms, doors and furniture are placed and written as a scene of a dataset (`ig2mj_homes.own`) and converted; furniture
+from folders and loose objects are added to the result; where loose objects lie is sampled; the home is checked.
+"""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import json
+import os
+import pathlib
+import tempfile
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ig2mj.callbacks import ProgressCallback, no_progress
+from ig2mj.errors import AbilityError, Ig2mjError, InputError, StateError, UnknownNameError
+
+if TYPE_CHECKING:
+    from ig2mj_converters.base.outcome import CheckResult
+    from ig2mj_homes.own.own_home import OwnHome
+
+    from ig2mj.sampling.conditions import Condition
+    from ig2mj.sampling.row import Row, RowSampler
+    from ig2mj.scene.scene import Scene
+
+MAX_HULLS = 16
+"""Convex pieces per link of the models of the catalogue, as in the homes that ship."""
+
+STEPS = ("placing furniture", "converting", "adding objects", "sampling", "checking")
+
+
+@dataclasses.dataclass(frozen=True)
+class MadeHome:
+    """What `make_home` did.
+
+    Attributes:
+      folder: of the home. rooms: their names. objects: name -> category of all that is in use, without the building.
+      checks: of the converter, and `reachable`: a robot of 0.3 m radius reaches every room and doorway.
+    """
+
+    folder: pathlib.Path
+    rooms: list[str]
+    objects: dict[str, str]
+    checks: list[CheckResult]
+
+    @property
+    def failed(self) -> list[str]:
+        """The checks that failed, a line each."""
+        return [f"{check.name}: {check.summary}{_first(check)}" for check in self.checks if not check.passed]
+
+
+def _first(check: CheckResult) -> str:
+    """The first object of a failed check, and its problem."""
+    if not check.failures:
+        return ""
+    return f" ({check.failures[0].get('object', '')} {check.failures[0].get('problem', '')})"
+
+
+def make_home(
+    file: str | os.PathLike,
+    out: str | os.PathLike | None = None,
+    *,
+    seed: int | None = None,
+    jobs: int = 2,
+    progress: ProgressCallback = no_progress,
+) -> MadeHome:
+    """Makes a home.
+
+    Args:
+      file: its TOML (`ig2mj_homes.own.description`).
+      out: output folder; an earlier result there is replaced once all went well. None: a folder of the home's name in
+        the working directory.
+      seed: in place of the file's. jobs: processes of the conversion.
+      progress: called with (steps done, steps in all, what is done).
+
+    Raises:
+      InputError: it names the file, the table and the key, and what is wrong.
+    """
+    from ig2mj_converters.base.options import ConvertOptions
+    from ig2mj_converters.base.output import replaced_folder
+    from ig2mj_converters.conversion import convert_scene
+    from ig2mj_homes.own.description import read_home
+    from ig2mj_homes.own.own_home import build_own
+
+    description = read_home(file)
+    if seed is not None:
+        description.seed = seed
+    target = pathlib.Path(out) if out is not None else pathlib.Path(description.name)
+    with replaced_folder(target) as folder, tempfile.TemporaryDirectory(prefix="ig2mj-home-") as temporary:
+        work = pathlib.Path(temporary)
+
+        def begin(step: str) -> None:
+            progress(STEPS.index(step), len(STEPS), step)
+
+        begin("placing furniture")
+        home = build_own(description, work / "dataset")
+        begin("converting")
+        options = ConvertOptions(jobs=jobs, cache=False, max_hulls=MAX_HULLS)
+        convert_scene(work / "dataset", description.name, work / "converted", options=options)
+        begin("adding objects")
+        _add(home, work, folder)
+        begin("sampling")
+        _sample(home, folder)
+        begin("checking")
+        checks = _check(home, folder)
+        progress(len(STEPS), len(STEPS), "done")
+    objects = {o.name: o.category for o in _scene(target).manifest.objects if o.in_household}
+    return MadeHome(target, home.rooms, objects, checks)
+
+
+def _scene(folder: pathlib.Path) -> Scene:
+    from ig2mj.scene.scene import load_scene
+
+    return load_scene(folder)
+
+
+def _add(home: OwnHome, work: pathlib.Path, folder: pathlib.Path) -> None:
+    """Writes the converted scene with what the dataset does not have: furniture from folders and loose objects."""
+    import msgspec
+
+    from ig2mj.scene.additions import Addition, add_objects
+    from ig2mj.scene.library import read_model
+    from ig2mj.scene.manifest import load_manifest
+    from ig2mj.scene.scene_folder import ROOMS_FILE, write_scene_folder
+
+    converted = work / "converted"
+    planned = []
+    for piece in home.pieces:
+        model = read_model(piece.folder, named=True)
+        x, y, z, yaw = piece.pose
+        fixed, start = ((x, y, z, yaw), None) if piece.fixed else (None, (x, y, z, yaw))
+        planned.append((Addition(piece.name, model.category, model.model, model.sha256, fixed, start), model))
+    for loose in home.loose:
+        model = read_model(_converted(loose, work), named=True)
+        planned.append((Addition(loose.name, model.category, model.model, model.sha256), model))
+    text, manifest = add_objects(converted / "scene.xml", load_manifest(converted), planned)
+    rooms = {piece.name: list(piece.rooms) for piece in home.pieces}
+    manifest.objects = [
+        msgspec.structs.replace(o, rooms=rooms[o.name]) if o.name in rooms else o for o in manifest.objects
+    ]
+    manifest.source = {**manifest.source, "file": pathlib.Path(home.description.file).name}
+    write_scene_folder(text, manifest, folder, converted / ROOMS_FILE)
+
+
+def _converted(loose: Any, work: pathlib.Path) -> pathlib.Path:
+    """The folder of a loose object's converted model."""
+    from ig2mj_converters.base.options import ConvertOptions
+    from ig2mj_converters.conversion import convert_object
+
+    if loose.source.suffix != ".urdf":
+        return loose.source
+    folder = work / "objects" / loose.category / loose.model
+    if not folder.is_dir():
+        options = ConvertOptions(cache=False, max_hulls=MAX_HULLS, report=False)
+        convert_object(loose.source, loose.category, folder, model=loose.model, options=options)
+    return folder
+
+
+def _sample(home: OwnHome, folder: pathlib.Path) -> None:
+    """Puts every loose object where its conditions hold, and makes the result the start of the home."""
+    from ig2mj.sampling.many import make_sampler
+    from ig2mj.scene.manifest import save_manifest
+    from ig2mj.scene.scene_folder import write_start
+    from ig2mj.states.initial import manifest_states
+
+    scene = _scene(folder)
+    sampler = make_sampler(scene)
+    groups = [(f"objects.{loose.key}.where", loose.conditions) for loose in home.loose]
+    groups.append(("conditions", tuple(home.description.conditions)))
+    asked: list[Condition] = []
+    row: Row | None = None
+    for number, (element, texts) in enumerate(groups):
+        wanted = _read(home, scene, element, texts)
+        if wanted:
+            row = _row(home, sampler, element, wanted, number)
+            sampler.start_from(row.physics, row.states)
+            asked += wanted
+    if row is None:
+        return
+    for condition in asked:
+        if not sampler.holds([condition], row.states):
+            problem = f"{condition} no longer holds when all objects are placed"
+            raise home.description.error("objects", problem, "try another seed, or other conditions")
+    engine = sampler.query.engine
+    model, data = engine.to_mujoco(sampler.query.physics, 0)
+    write_start(folder, model, data.qpos)
+    names = [model.body(b).name for b in range(model.nbody)]
+    for entry, states in zip(scene.manifest.objects, manifest_states(sampler.model, row.states, names), strict=True):
+        entry.state = states
+    save_manifest(scene.manifest, folder / "manifest.json")
+
+
+def _read(home: OwnHome, scene: Scene, element: str, texts: tuple[str, ...]) -> list[Condition]:
+    """Conditions with rooms by their names in the scene, and categories bound. Raises InputError."""
+    from ig2mj.predicates.parse import ExpressionError
+    from ig2mj.sampling.conditions import bind, read_conditions
+
+    rooms = {name: f"{name}_0" for name in home.description.rooms if f"{name}_0" in home.rooms}
+    rng = np.random.default_rng([home.description.seed, 1])
+    try:
+        found = [
+            dataclasses.replace(c, arguments=tuple(rooms.get(a, a) for a in c.arguments))
+            for c in read_conditions(texts)
+        ]
+        return bind(found, scene.tables, rng)
+    except (ExpressionError, StateError, AbilityError, UnknownNameError) as e:
+        raise home.description.error(element, str(e)) from e
+
+
+def _row(home: OwnHome, sampler: RowSampler, element: str, wanted: list[Condition], number: int) -> Row:
+    """A state in which conditions hold, in addition to what stands. Raises InputError: none was found."""
+    from ig2mj.sampling.many import sample_row
+
+    try:
+        row, rejected = sample_row(sampler, wanted, home.description.seed, number)
+    except (StateError, AbilityError, UnknownNameError) as e:
+        raise home.description.error(element, str(e)) from e
+    if row is None:
+        reasons = _why(rejected)
+        text = " and ".join(map(str, wanted))
+        raise home.description.error(element, f"{text} cannot be made true{reasons}")
+    return row
+
+
+def _why(rejected: collections.Counter) -> str:
+    """The reasons why candidates were turned down, the most frequent first."""
+    found = ", ".join(f"{reason} ({count} times)" for reason, count in rejected.most_common(3))
+    return f": {found}" if found else ""
+
+
+def _check(home: OwnHome, folder: pathlib.Path) -> list[CheckResult]:
+    """The checks that homes that ship pass; also writes them to checks.json."""
+    import mujoco
+    from ig2mj_converters.base.outcome import CheckResult
+    from ig2mj_converters.checks.run import run_checks
+    from ig2mj_homes.own.own_home import unreachable
+
+    from ig2mj.sampling.query import SceneQuery
+    from ig2mj.scene.manifest import load_manifest
+
+    checks = run_checks(mujoco.MjModel.from_xml_path(str(folder / "scene.xml")), load_manifest(folder))
+    scene = _scene(folder)
+    query = SceneQuery(scene)
+    names = {loose.name for loose in home.loose}
+    boxes = [query.box(k) for k, name in enumerate(scene.object_names) if name in names]
+    lost = unreachable(home, np.array(boxes).reshape(-1, 2, 3))
+    failures = [{"object": lost, "problem": "cannot be reached by a robot of 0.3 m radius"}] if lost else []
+    summary = f"a robot of 0.3 m radius reaches {'not all of' if lost else 'all'} {len(home.rooms)} rooms"
+    checks.append(CheckResult("reachable", not lost, summary, failures))
+    kept = [{key: getattr(c, key) for key in ("name", "passed", "summary", "failures")} for c in checks]
+    text = json.dumps(kept, indent=1, default=lambda value: value.tolist()) + "\n"
+    (folder / "checks.json").write_text(text, encoding="utf-8", newline="\n")
+    return checks
