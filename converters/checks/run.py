@@ -23,12 +23,14 @@ def run_checks(
     manifest: Manifest,
     overlaps_allowed: Collection[frozenset[str]] = (),
     sources: Mapping[str, SourceBox] | None = None,
+    closed: mujoco.MjModel | None = None,
 ) -> list[CheckResult]:
     """All checks, in the order of `CheckResult.name`. The model is left as it was.
 
     Args:
       overlaps_allowed: pairs of object names from misc/bbox_overlap.json that may penetrate at t = 0.
       sources: object name -> size of its source's collision shapes, measured on them.
+      closed: the same scene at another start, from which joints are moved, where `model` starts with some open.
     """
     index = index_model(model, manifest)
     checks: list[Callable[[], CheckResult]] = [
@@ -44,4 +46,4 @@ def run_checks(
         result = check()
         result.seconds = time.perf_counter() - started
         results.append(result)
-    return results + motion.check_joints(model, manifest, index)
+    return results + motion.check_joints(closed or model, manifest, index)

@@ -70,8 +70,8 @@ class RoomKit(LooseKit):
                 position = self._against(name, spot, -form.low[0] + back, -(form.low[1] + form.high[1]) / 2, turn)
                 position[2] = height - form.low[2] + (0 if (height or find(category).fixed) else AIR)
                 thing = self.thing(category, index, position, turn, fixed)
-                if self._before_window(thing, name, under_window):
-                    self.problem = self.problem or "stands before a window"
+                if window := self._before_window(thing, name, under_window):
+                    self.problem = self.problem or f"stands before {window}"
                     continue
                 if self._stand(thing, gap, room_before):
                     return thing
@@ -281,16 +281,17 @@ class RoomKit(LooseKit):
         foot = {"south": (at, y0), "north": (at, y1), "west": (x0, at), "east": (x1, at)}[side]
         return np.array([*foot, 0.0]) + turn @ np.array([depth, middle, 0.0])
 
-    def _before_window(self, thing: Placed, side: str, allowed: bool) -> bool:
-        """Whether it stands in a window's light."""
+    def _before_window(self, thing: Placed, side: str, allowed: bool) -> str:
+        """The window in whose light it stands, or ''."""
         low, high = thing.box()
         axis = "x" if side in ("south", "north") else "y"
         k = 0 if axis == "x" else 1
-        for opening in self.home.plan.openings:
-            if opening.kind != "window" or self.room.name not in opening.edge.rooms or opening.edge.axis != axis:
+        windows = [opening for opening in self.home.plan.openings if opening.kind == "window"]
+        for number, opening in enumerate(windows):
+            if self.room.name not in opening.edge.rooms or opening.edge.axis != axis:
                 continue
             at_wall = abs(opening.edge.at - (low[1 - k] if side in ("south", "west") else high[1 - k])) < 0.3
             overlaps = low[k] < opening.high and high[k] > opening.low
             if at_wall and overlaps and (high[2] > opening.bottom + 0.02 or not allowed):
-                return True
-        return False
+                return f"window_{number}"
+        return ""

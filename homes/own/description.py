@@ -38,6 +38,7 @@ import os
 import pathlib
 import re
 import tomllib
+import typing
 from collections.abc import Collection, Mapping
 from typing import Any, Literal, TypeVar
 
@@ -56,6 +57,15 @@ LARGEST = 50.0
 MOST_COPIES = 50
 """Of one object."""
 OUTSIDE = "outside"
+WORDS = {
+    "Invalid enum value": "it cannot be",
+    "`": "'",
+    "Object": "It",
+    "array": "list",
+    " | null": "",
+    "Expected": "expected",
+}
+"""Words of msgspec's errors, and those for a reader of TOML."""
 
 
 class DoorSpec(msgspec.Struct, forbid_unknown_fields=True):
@@ -157,7 +167,8 @@ class HomeDescription(msgspec.Struct, forbid_unknown_fields=True):
 
 def near(name: str, known: Collection[str], few: int = 20) -> str:
     """The end of an error: names that are like a wrong one, else all where they are few."""
-    found = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
+    parts = [other for other in known if len(name) > 2 and name in other.split("_")]
+    found = list(dict.fromkeys([*parts[:3], *difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)]))
     if found:
         return f"; near matches: {', '.join(found)}"
     return f" (there is {', '.join(known)})" if known and len(known) <= few else ""
@@ -221,9 +232,22 @@ def _converted(value: Any, kind: type[Kind], file: object, element: str) -> Kind
     except msgspec.ValidationError as e:
         text, _, at = str(e).partition(" - at `$")
         inner = at.removesuffix("`").replace("[...]", "")
-        raise InputError(file, text.replace("Object", "It").replace("`", "'"), element=f"{element}{inner}") from e
+        for word, plain in WORDS.items():
+            text = text.replace(word, plain)
+        options = _options(kind, inner.removeprefix("."))
+        fix = f"use {', '.join(options[:-1])} or {options[-1]}" if options else ""
+        raise InputError(file, text, element=f"{element}{inner}", fix=fix) from e
     _check_finite(found, file, element)
     return found
+
+
+def _options(kind: Any, field: str) -> list[str]:
+    """The words that a key can be, if it is a choice of words."""
+    if not hasattr(kind, "__struct_fields__"):
+        return []
+    types = [f.type for f in msgspec.structs.fields(kind) if f.name == field]
+    parts = [part for type_ in types for part in (type_, *typing.get_args(type_))]
+    return [str(word) for part in parts if typing.get_origin(part) is Literal for word in typing.get_args(part)]
 
 
 def _check_finite(value: Any, file: object, element: str) -> None:

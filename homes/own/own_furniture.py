@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 import random
+import re
 
 from ..furnish.arrangement import FLAT
 from ..furnish.clearances import blocked
@@ -28,8 +30,27 @@ AROUND.sort(key=lambda p: (p[0] ** 2 + p[1] ** 2, p))
 """m from a wanted place, the nearest first: where a place is looked for that an error can name."""
 
 
+class _WindowInTheWay(Exception):
+    """A piece has no room because of a window that the file does not ask for. number: of the window."""
+
+    def __init__(self, number: int):
+        self.number = number
+
+
 def furnish_own(home: HomeDescription, plan: Plan) -> HomeInProgress:
-    """The plan with doors, windows and all pieces. Raises InputError: it names the piece and what is in its way."""
+    """The plan with doors, windows and all pieces. Raises InputError: it names the piece and what is in its way.
+
+    Where the file leaves windows open, those that are in the way of a piece whose place it gives are left out.
+    """
+    while True:
+        try:
+            return _furnished(home, plan)
+        except _WindowInTheWay as e:
+            window = [opening for opening in plan.openings if opening.kind == "window"][e.number]
+            plan = dataclasses.replace(plan, openings=tuple(o for o in plan.openings if o is not window))
+
+
+def _furnished(home: HomeDescription, plan: Plan) -> HomeInProgress:
     rng = random.Random(f"{home.seed}/{home.name}/things")
     try:
         made = start_home(plan, rng, seed=home.seed)
@@ -106,8 +127,14 @@ def _place(home: HomeDescription, made: HomeInProgress, name: str, spec: PieceSp
     kit.problem = ""
     found = _tried(kit, spec, category, index, anchor)
     if found is None:
-        problem = kit.problem or "finds no place"
-        raise home.error(element, f"{model} does not fit: it {problem}", _hint(kit, spec, category, index))
+        if home.windows is None and given and (match := re.search(r"\bwindow_(\d+)", kit.problem)):
+            raise _WindowInTheWay(int(match[1]))
+        anywhere = not given or (spec.wall is not None and spec.at is None)
+        where = f"the {spec.wall} wall of {kit.room.name}" if spec.wall else kit.room.name
+        problem = f"{model} does not fit: it {kit.problem or 'finds no place'}"
+        if anywhere:
+            problem = f"{model} finds no place {'at' if spec.wall else 'in'} {where}"
+        raise home.error(element, problem, _hint(kit, spec, category, index))
     return found
 
 

@@ -78,7 +78,7 @@ COMMANDS: dict[str, str] = {
     "demos": "record demonstrations of scripted experts; replay, export, measure and convert recordings",
     "sample-task": "sample an environment's start states and store them in the cache",
     "objects": "list and show the objects that can be added to a home, add libraries of your own",
-    "homes": "list, build, convert and render the homes that come with ig2mj",
+    "homes": "make a home of your own; list, build, convert and render those that come with ig2mj",
     "doctor": "show what this machine can run, and how to fix what it cannot",
 }
 

@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ig2mj.callbacks import ProgressCallback, no_progress
-from ig2mj.errors import AbilityError, Ig2mjError, InputError, StateError, UnknownNameError
+from ig2mj.errors import AbilityError, Ig2mjError, StateError, UnknownNameError
 
 if TYPE_CHECKING:
+    import mujoco
     from ig2mj_converters.base.outcome import CheckResult
     from ig2mj_homes.own.own_home import OwnHome
 
@@ -65,7 +66,7 @@ def make_home(
     out: str | os.PathLike | None = None,
     *,
     seed: int | None = None,
-    jobs: int = 2,
+    jobs: int = 1,
     progress: ProgressCallback = no_progress,
 ) -> MadeHome:
     """Makes a home.
@@ -80,13 +81,14 @@ def make_home(
     Raises:
       InputError: it names the file, the table and the key, and what is wrong.
     """
+    from ig2mj_homes.own.description import read_home
+
+    description = read_home(file)  # errors before what takes seconds to import
     from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.base.output import replaced_folder
     from ig2mj_converters.conversion import convert_scene
-    from ig2mj_homes.own.description import read_home
     from ig2mj_homes.own.own_home import build_own
 
-    description = read_home(file)
     if seed is not None:
         description.seed = seed
     target = pathlib.Path(out) if out is not None else pathlib.Path(description.name)
@@ -98,15 +100,18 @@ def make_home(
 
         begin("placing furniture")
         home = build_own(description, work / "dataset")
+        for element, texts in _groups(home):
+            _check_names(home, element, texts)
         begin("converting")
-        options = ConvertOptions(jobs=jobs, cache=False, max_hulls=MAX_HULLS)
+        options = ConvertOptions(jobs=jobs, cache=False, max_hulls=MAX_HULLS, report=False)
         convert_scene(work / "dataset", description.name, work / "converted", options=options)
         begin("adding objects")
         _add(home, work, folder)
         begin("sampling")
+        closed = _compiled(folder)
         _sample(home, folder)
         begin("checking")
-        checks = _check(home, folder)
+        checks = _check(home, folder, closed)
         progress(len(STEPS), len(STEPS), "done")
     objects = {o.name: o.category for o in _scene(target).manifest.objects if o.in_household}
     return MadeHome(target, home.rooms, objects, checks)
@@ -116,6 +121,13 @@ def _scene(folder: pathlib.Path) -> Scene:
     from ig2mj.scene.scene import load_scene
 
     return load_scene(folder)
+
+
+def _compiled(folder: pathlib.Path) -> mujoco.MjModel:
+    """The scene without what only physics has."""
+    import mujoco
+
+    return mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
 
 
 def _add(home: OwnHome, work: pathlib.Path, folder: pathlib.Path) -> None:
@@ -169,11 +181,9 @@ def _sample(home: OwnHome, folder: pathlib.Path) -> None:
 
     scene = _scene(folder)
     sampler = make_sampler(scene)
-    groups = [(f"objects.{loose.key}.where", loose.conditions) for loose in home.loose]
-    groups.append(("conditions", tuple(home.description.conditions)))
     asked: list[Condition] = []
     row: Row | None = None
-    for number, (element, texts) in enumerate(groups):
+    for number, (element, texts) in enumerate(_groups(home)):
         wanted = _read(home, scene, element, texts)
         if wanted:
             row = _row(home, sampler, element, wanted, number)
@@ -194,20 +204,44 @@ def _sample(home: OwnHome, folder: pathlib.Path) -> None:
     save_manifest(scene.manifest, folder / "manifest.json")
 
 
-def _read(home: OwnHome, scene: Scene, element: str, texts: tuple[str, ...]) -> list[Condition]:
-    """Conditions with rooms by their names in the scene, and categories bound. Raises InputError."""
-    from ig2mj.predicates.parse import ExpressionError
-    from ig2mj.sampling.conditions import bind, read_conditions
+def _groups(home: OwnHome) -> list[tuple[str, tuple[str, ...]]]:
+    """(element of the file, conditions) of what is sampled one after another."""
+    groups = [(f"objects.{loose.key}.where", loose.conditions) for loose in home.loose]
+    return [*groups, ("conditions", tuple(home.description.conditions))]
+
+
+def _conditions(home: OwnHome, element: str, texts: tuple[str, ...]) -> list[Condition]:
+    """Conditions with rooms by their names in the scene. Raises InputError."""
+    from ig2mj.sampling.conditions import read_conditions
 
     rooms = {name: f"{name}_0" for name in home.description.rooms if f"{name}_0" in home.rooms}
-    rng = np.random.default_rng([home.description.seed, 1])
     try:
-        found = [
-            dataclasses.replace(c, arguments=tuple(rooms.get(a, a) for a in c.arguments))
-            for c in read_conditions(texts)
-        ]
-        return bind(found, scene.tables, rng)
-    except (ExpressionError, StateError, AbilityError, UnknownNameError) as e:
+        found = read_conditions(texts)
+    except Ig2mjError as e:
+        raise home.description.error(element, str(e)) from e
+    return [dataclasses.replace(c, arguments=tuple(rooms.get(a, a) for a in c.arguments)) for c in found]
+
+
+def _check_names(home: OwnHome, element: str, texts: tuple[str, ...]) -> None:
+    """Refuses names that nothing in the home has, before it is converted."""
+    things = home.made.things.things.values()
+    known = {*(t.name for t in things), *(t.category for t in things), *home.rooms}
+    known |= {name for loose in home.loose for name in (loose.name, loose.category)}
+    for name in (a for c in _conditions(home, element, texts) for a in c.arguments):
+        if name not in known and name.partition("#")[0] not in known:
+            raise home.description.error(
+                element, str(UnknownNameError("object, room or category", name, sorted(known)))
+            )
+
+
+def _read(home: OwnHome, scene: Scene, element: str, texts: tuple[str, ...]) -> list[Condition]:
+    """Conditions of objects in the scene, categories bound. Raises InputError."""
+    from ig2mj.sampling.conditions import bind
+
+    found = _conditions(home, element, texts)
+    try:
+        return bind(found, scene.tables, np.random.default_rng([home.description.seed, 1]))
+    except (StateError, UnknownNameError) as e:
         raise home.description.error(element, str(e)) from e
 
 
@@ -232,9 +266,8 @@ def _why(rejected: collections.Counter) -> str:
     return f": {found}" if found else ""
 
 
-def _check(home: OwnHome, folder: pathlib.Path) -> list[CheckResult]:
-    """The checks that homes that ship pass; also writes them to checks.json."""
-    import mujoco
+def _check(home: OwnHome, folder: pathlib.Path, closed: mujoco.MjModel) -> list[CheckResult]:
+    """The checks that homes that ship pass; also writes them to checks.json. closed: before anything was opened."""
     from ig2mj_converters.base.outcome import CheckResult
     from ig2mj_converters.checks.run import run_checks
     from ig2mj_homes.own.own_home import unreachable
@@ -242,7 +275,7 @@ def _check(home: OwnHome, folder: pathlib.Path) -> list[CheckResult]:
     from ig2mj.sampling.query import SceneQuery
     from ig2mj.scene.manifest import load_manifest
 
-    checks = run_checks(mujoco.MjModel.from_xml_path(str(folder / "scene.xml")), load_manifest(folder))
+    checks = run_checks(_compiled(folder), load_manifest(folder), closed=closed)
     scene = _scene(folder)
     query = SceneQuery(scene)
     names = {loose.name for loose in home.loose}
