@@ -87,7 +87,11 @@ def ids(pages: list[pathlib.Path]) -> list[str]:
 OF_THEIR_OWN = {"own_homes"}
 """Pages whose Python is run by tests of its own, since it needs what their commands make."""
 
-with_python = [p for p in PAGES if p.stem not in OF_THEIR_OWN and any(language == "python" and remark != GPU for remark, language, _ in blocks(p))]
+with_python = [
+    p
+    for p in PAGES
+    if p.stem not in OF_THEIR_OWN and any(language == "python" and remark != GPU for remark, language, _ in blocks(p))
+]
 with_python_for_gpu = [p for p in PAGES if any(remark == GPU for remark, _, _ in blocks(p))]
 with_commands = [p for p in PAGES if any(language == "sh" for _, language, _ in blocks(p))]
 

@@ -104,7 +104,7 @@ MISTAKES = {
     "[furniture]\nsofa = { model = 'obj/sofa', room = 'kitchen' }": "obj/sofa/manifest.json",
     "[furniture]\nstove = { right_of = 'fridge' }\nfridge = { room = 'kitchen' }": "it comes later in the file",
     "[furniture]\na = { model = 'car', room = 'kitchen' }": "finds no place in kitchen_0",
-    "[furniture]\nb = { model = 'bed', position = [2, 2] }\nc = { model = 'bed', position = [2, 1.5] }": "furniture.c: bed does not fit: it overlaps b",
+    "[furniture]\nb = { model = 'bed', position = [2, 2] }\nc = { model = 'bed', position = [2, 1] }": "it overlaps b",
     "[objects]\nmug = { where = '(on_top mug table)', count = 0 }": "objects.mug.count: is 0",
 }
 

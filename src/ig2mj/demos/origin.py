@@ -80,14 +80,13 @@ def _task_of(env: Environment) -> tuple[TaskLike, str, tuple[str, ...]]:
 def origin_of_scene(scene: Scene, version: int = FORMAT_VERSION) -> dict[str, Any]:
     """Origin of a scene with its robots. `version`: see `origin_of`."""
     whole = version == WHOLE_HASHES
-    additions = [a.wanted for a in scene.additions]
     return {
         "scene": scene.name,
         "scene_hash": scene.files_digest if whole else scene.digest,
         "model_hash": whole_hash(scene.model) if whole else physics_hash(scene.model),
         "appearance_hash": appearance_hash(scene.model),
         "objects": json.dumps(list(scene.object_names)),
-        "additions": json.dumps(additions),
+        "additions": json.dumps(scene.requested),
         "additions_found_by": json.dumps(entries_of(scene.additions)),
     }
 

@@ -40,6 +40,7 @@ from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import VECTORS, find_task, make
 from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.process import entry_point
+from ig2mj.scene.changes import added
 from ig2mj.scene.found_again import requests_again
 from ig2mj.tasks.task import Task
 
@@ -276,7 +277,7 @@ def objects_again(recording: Recording, wanted: Any) -> tuple[str, ...]:
     if not isinstance(wanted, list) or not all(isinstance(text, str) for text in wanted):
         raise InputError(recording.file, "has objects that are no list of texts", element="attribute made_with")
     known = recording.value("additions_found_by", list)
-    return requests_again(wanted, known[-len(wanted) :], recording.file)
+    return requests_again(wanted, known[len(known) - len(added(wanted)) :], recording.file)
 
 
 def recorded_observations(recording: Recording) -> tuple[str, ...]:

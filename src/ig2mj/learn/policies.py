@@ -38,6 +38,7 @@ from ig2mj.learn.perception import DEPTH_RANGE, SIZE, Perception
 from ig2mj.learn.policy_checks import check_arrays, check_card, check_play, check_scales
 from ig2mj.learn.running_stats import RunningStats
 from ig2mj.process import entry_point
+from ig2mj.scene.changes import added
 from ig2mj.scene.found_again import entries_of, requests_again
 from ig2mj.tasks.added_objects import object_texts
 
@@ -66,7 +67,8 @@ def objects_on_card(env: Any) -> dict[str, Any]:
     if config is None or not config.objects:
         return {}
     wanted = list(object_texts(config.objects))
-    return {"objects": wanted, "objects_found_by": entries_of(env.scene.additions[-len(wanted) :])}
+    additions = env.scene.additions
+    return {"objects": wanted, "objects_found_by": entries_of(additions[len(additions) - len(added(wanted)) :])}
 
 
 def objects_of(policy: Policy, file: object) -> tuple[str, ...]:

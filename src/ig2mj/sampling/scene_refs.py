@@ -16,7 +16,7 @@ def named(scene: Scene) -> dict[str, Any]:
 
     `scene`: its name if it ships, else its folder. `objects`: what was added to it.
     """
-    return {"scene": scene.portable_name, "objects": [a.wanted for a in scene.additions]}
+    return {"scene": scene.portable_name, "objects": scene.requested}
 
 
 def check_of(scene: Scene) -> tuple[str, dict[str, Any]]:
@@ -27,7 +27,7 @@ def check_of(scene: Scene) -> tuple[str, dict[str, Any]]:
 @contextlib.contextmanager
 def lent(scene: Scene) -> Iterator[None]:
     """During the block, jobs that run in this process use this scene object."""
-    key = scene.portable_name, tuple(a.wanted for a in scene.additions)
+    key = scene.portable_name, tuple(scene.requested)
     _lent[key] = scene
     try:
         yield

@@ -133,25 +133,31 @@ def plan_additions(manifest: Manifest, requests: Sequence[ObjectRequest]) -> lis
     return found
 
 
+def read_absolute(file: pathlib.Path) -> ElementTree.Element:
+    """The MJCF of a home, with absolute paths. Raises InputError."""
+    root = read_mjcf(file)
+    make_absolute(root, file.parent)
+    return root
+
+
 def add_objects(
-    file: pathlib.Path, manifest: Manifest, planned: Sequence[tuple[Addition, LibraryModel]]
-) -> tuple[str, Manifest]:
-    """A home with objects added.
+    root: ElementTree.Element, manifest: Manifest, planned: Sequence[tuple[Addition, LibraryModel]]
+) -> Manifest:
+    """Adds objects to a home.
 
     Args:
-      file: its scene.xml. manifest: its manifest; not changed. planned: as of `plan_additions`.
+      root: its MJCF, as of `read_absolute`; objects are added to it. manifest: its manifest; not changed.
+      planned: as of `plan_additions`.
 
     Returns:
-      MJCF whose paths are absolute, and the manifest with all entries.
+      The manifest with all entries.
 
     Raises:
       InputError: a file is not MJCF, or one of an object does not fit the home's.
     """
-    root = read_mjcf(file)
-    make_absolute(root, file.parent)
     world = _child(root, "worldbody")
     waiting = [o for a, model in planned if a.place is None for o in _parked(a, model)]
-    cells = _add_slab(root, waiting) if waiting else []
+    slab, cells = _add_slab(root, waiting) if waiting else (world, [])
     start: list[list[float]] = []
     standing: list[tuple[ElementTree.Element, int]] = []
     cell = iter(cells)
@@ -189,7 +195,7 @@ def add_objects(
                 start.append([*values, *inner] if free else list(inner))
                 world.append(body)
     if standing:
-        _lay_down(root, standing, start)
+        _lay_down(root, slab, standing, start)
     _extend_key(root, [value for values in start for value in values])
     merged = copy.copy(manifest)
     merged.objects = list(manifest.objects)
@@ -198,7 +204,7 @@ def add_objects(
         if addition.place is not None:
             entries = [msgspec.structs.replace(entries[0], fixed=True, assisted_grasp=False)]
         merged.objects += entries
-    return ElementTree.tostring(root, encoding="unicode"), merged
+    return merged
 
 
 def _parked(addition: Addition, model: LibraryModel) -> list[ObjectEntry]:
@@ -295,8 +301,13 @@ def _fix(body: ElementTree.Element) -> None:
         body.remove(joint)
 
 
-def _add_slab(root: ElementTree.Element, entries: Sequence[ObjectEntry]) -> list[tuple[float, float]]:
-    """Adds the slab and returns a place (x, y) on it for each object, whatever way it is turned."""
+def _add_slab(
+    root: ElementTree.Element, entries: Sequence[ObjectEntry]
+) -> tuple[ElementTree.Element, list[tuple[float, float]]]:
+    """Adds the slab; gives it and a place (x, y) on it for each object, whatever way it is turned.
+
+    A home to which objects were added before it was written has such slabs; this one is beyond them.
+    """
     reach = [math.hypot(*o.base_link_offset) + math.hypot(*o.bounding_box) / 2 for o in entries]
     cell = 2 * max(reach, default=0.0) + CLEARANCE
     columns = math.ceil(math.sqrt(len(entries)))
@@ -304,24 +315,28 @@ def _add_slab(root: ElementTree.Element, entries: Sequence[ObjectEntry]) -> list
     statistic = root.find("statistic")
     given = {} if statistic is None else statistic.attrib
     centre = [float(v) for v in given.get("center", "0 0 0").split()]
-    x = centre[0] - float(given.get("extent", "10")) - DISTANCE - half
-    body = ElementTree.SubElement(
-        _child(root, "worldbody"), "body", name=SLAB, pos=_numbers([x, centre[1], HEIGHT - 0.1])
-    )
+    world = _child(root, "worldbody")
+    others = [b for b in world.findall("body") if str(b.get("name")).startswith(SLAB)]
+    ends = [float(b.get("pos", "0").split()[0]) - float(b[0].get("size", "0").split()[0]) for b in others]
+    x = min([centre[0] - float(given.get("extent", "10")) - DISTANCE, *(end - CLEARANCE for end in ends)]) - half
+    name = f"{SLAB}_{len(others)}" if others else SLAB
+    body = ElementTree.SubElement(world, "body", name=name, pos=_numbers([x, centre[1], HEIGHT - 0.1]))
     size = _numbers([half, half, 0.1])
-    place = {"name": f"{SLAB}/collision_0", "class": "collision", "type": "box", "size": size}
+    place = {"name": f"{name}/collision_0", "class": "collision", "type": "box", "size": size}
     ElementTree.SubElement(body, "geom", place, rgba="0.5 0.5 0.5 1")
-    return [
+    return body, [
         (x - half + (i % columns + 0.5) * cell, centre[1] - half + (i // columns + 0.5) * cell)
         for i in range(len(entries))
     ]
 
 
 def _lay_down(
-    root: ElementTree.Element, standing: Sequence[tuple[ElementTree.Element, int]], start: list[list[float]]
+    root: ElementTree.Element,
+    slab: ElementTree.Element,
+    standing: Sequence[tuple[ElementTree.Element, int]],
+    start: list[list[float]],
 ) -> None:
     """Gives the bodies on the slab the poses in which they rest. `standing`: each, and its number in `start`."""
-    slab = next(body for body in _child(root, "worldbody") if body.get("name") == SLAB)
     found = rest(root, slab, [body for body, _ in standing], [v for _, number in standing for v in start[number]])
     first = 0
     for body, number in standing:

@@ -12,6 +12,7 @@ import msgspec
 
 from ig2mj.errors import InputError
 from ig2mj.scene.additions import Addition
+from ig2mj.scene.changes import added
 from ig2mj.scene.library import LibraryModel, folder_of, own_library, read_model
 
 
@@ -67,10 +68,11 @@ def requests_again(
         known = [entry.addition() for entry in msgspec.convert(list(entries), list[AdditionEntry])]
     except msgspec.ValidationError as e:
         raise InputError(file, str(e), element="objects") from e
-    if len(known) != len(wanted):
+    texts = added(wanted)
+    if len(known) != len(texts):
         raise InputError(file, f"names {len(wanted)} objects and describes {len(known)}", element="objects")
-    found = []
-    for text, was, now in zip(wanted, known, find_again(known, file), strict=True):
+    found = [text for text in wanted if text not in texts]
+    for text, was, now in zip(texts, known, find_again(known, file), strict=True):
         moved = was.folder is not None and now.folder is not None and text.startswith(was.folder)
         found.append(f"{now.folder}{text.removeprefix(str(was.folder))}" if moved else text)
     return tuple(found)

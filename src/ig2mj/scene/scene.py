@@ -9,6 +9,7 @@ import hashlib
 import json
 import os
 import pathlib
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
@@ -17,12 +18,15 @@ import mujoco
 from ig2mj.cluster.jobs import import_function
 from ig2mj.errors import Ig2mjError, InputError, ManifestError, UnknownNameError, without_lines
 from ig2mj.files.inside import inside
-from ig2mj.scene.additions import Addition, add_objects, plan_additions
+from ig2mj.scene.additions import Addition, plan_additions
 from ig2mj.scene.build_tables import build_tables
 from ig2mj.scene.ceilings import add_ceiling
+from ig2mj.scene.changes import Change, changes_of, read_change
 from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
+from ig2mj.scene.library import find_model
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
+from ig2mj.scene.merging import merged_home
 from ig2mj.scene.mjcf_files import read_mjcf
 from ig2mj.scene.mjcf_limits import check_mjcf
 from ig2mj.scene.object_requests import ObjectRequest, Pose, read_request
@@ -61,6 +65,8 @@ class Scene:
       rooms: room maps, or None.
       agents: what was attached when it was loaded, in the order of the A axis.
       additions: objects that were added when it was loaded; they come last on the O axis.
+      changes: objects of the home that were removed or replaced. removed: names of all that went, with what stood on
+        them.
     """
 
     folder: pathlib.Path
@@ -70,6 +76,13 @@ class Scene:
     rooms: Rooms | None = None
     agents: tuple[Agent, ...] = ()
     additions: tuple[Addition, ...] = ()
+    changes: tuple[Change, ...] = ()
+    removed: tuple[str, ...] = ()
+
+    @property
+    def requested(self) -> list[str]:
+        """What `load_scene(objects=...)` takes for its changes and additions."""
+        return [*(change.text for change in self.changes), *(addition.wanted for addition in self.additions)]
 
     @property
     def name(self) -> str:
@@ -91,6 +104,9 @@ class Scene:
             hashed.update(f"\n{addition.find().physics_digest} {addition.place}".encode())
             if addition.start is not None:
                 hashed.update(f" {addition.start}".encode())
+        for change in self.changes:
+            new = "" if change.instead is None else find_model(change.instead).physics_digest
+            hashed.update(f"\n{change.name} {new}".encode())
         return _known_digests().get(hashed.hexdigest(), hashed.hexdigest())
 
     @functools.cached_property
@@ -128,10 +144,10 @@ class Scene:
     def spec(self) -> mujoco.MjSpec:
         """The scene with additions and agents, read again, to be changed and compiled; ids are those of `model`."""
         file = model_file(self.folder)
-        if self.additions:
+        if self.additions or self.changes:
             own = load_manifest(self.folder / MANIFEST_FILE)
-            text, _ = add_objects(file, own, [(a, a.find()) for a in self.additions])
-            spec = _spec_from_text(text, file)
+            merged = merged_home(file, own, self.changes, [(a, a.find()) for a in self.additions])
+            spec = _spec_from_text(ElementTree.tostring(merged.root, encoding="unicode"), file)
         else:
             spec = read_spec(file)
         _make_solid(spec, self.manifest, self.folder)
@@ -176,7 +192,14 @@ and (object, predicate, object or room) for each; gives their poses by name. Nam
 on scenes."""
 
 
-def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: Objects = ()) -> Scene:
+def load_scene(
+    path: str | os.PathLike,
+    agents: Sequence[Agent] = (),
+    objects: Objects = (),
+    *,
+    remove: str | Sequence[str] = (),
+    replace: Mapping[str, str | os.PathLike] | None = None,
+) -> Scene:
     """Loads a converted scene.
 
     Args:
@@ -188,26 +211,32 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: O
         same); without one it stands outside the house until it is put somewhere. An object from a folder is named
         `<folder name>_<n>`, one of a library `<category>_<n>`; `n` goes on from the home's own. Objects of one's own
         are loose at their place unless they were converted as fixed, those of the library that ships are fixed for
-        good; "fixed:" and "loose:" after the "@" say which.
+        good; "fixed:" and "loose:" after the "@" say which. "remove:NAME" and "replace:NAME=MODEL" stand for the
+        arguments below.
+      remove: objects of the home that are taken out, with what stands on or in them (`Scene.removed`).
+      replace: objects of the home, and what takes their place and their name: a folder or a name of the object library.
+        It is fixed to the house if the old one was. What stood on the old one is put down on the new one where that
+        has room for it, and is taken out where not.
 
     Raises:
       InputError: a file is missing or is not valid MJCF. UnknownNameError: there is no such folder and the library has
-        no such object. ManifestError: a manifest is broken, or does not belong to its MJCF. StateError: no place was
-        found at which the predicate holds.
+        no such object, or the home has none of this name. Ig2mjError: a replacement stands in something, or falls.
+        ManifestError: a manifest is broken, or does not belong to its MJCF. StateError: no place was found at which the
+        predicate holds.
     """
     file = model_file(path)
     home = load_manifest(file.parent / MANIFEST_FILE)
-    requests = _requests(objects)
+    changes, requests = _requests([*changes_of(remove, replace), *_listed(objects)])
     if any(request.predicate for request in requests):
         plan = plan_additions(home, [dataclasses.replace(r, place=None) if r.predicate else r for r in requests])
         names = [addition.name for addition, _ in plan]
         asked = [(n, *r.predicate) for n, r in zip(names, requests, strict=True) if r.predicate]
-        poses: dict[str, Pose] = import_function(PLACER)(_load(file, home, (), requests), asked)
+        poses: dict[str, Pose] = import_function(PLACER)(_load(file, home, (), requests, changes), asked)
         requests = [
             dataclasses.replace(r, place=poses[n], kind="loose", predicate=None) if r.predicate else r
             for n, r in zip(names, requests, strict=True)
         ]
-    return _load(file, home, agents, requests)
+    return _load(file, home, agents, requests, changes)
 
 
 def scene_with(scene: Scene | str | os.PathLike, objects: Objects = ()) -> Scene:
@@ -219,31 +248,49 @@ def scene_with(scene: Scene | str | os.PathLike, objects: Objects = ()) -> Scene
     return scene
 
 
-def _requests(objects: Objects) -> list[ObjectRequest]:
+def _listed(objects: Objects) -> list[str | os.PathLike]:
     if isinstance(objects, Mapping):
         raise Ig2mjError(f"objects = {objects!r}: a list of names, one for each object to add")
-    return [read_request(o) for o in ((objects,) if isinstance(objects, str | os.PathLike) else objects)]
+    return [objects] if isinstance(objects, str | os.PathLike) else list(objects)
 
 
-def _load(file: pathlib.Path, manifest: Manifest, agents: Sequence[Agent], requests: list[ObjectRequest]) -> Scene:
-    folder, additions = file.parent, list[Addition]()
-    if requests:
+def _requests(objects: Objects) -> tuple[list[Change], list[ObjectRequest]]:
+    """Changes and objects to add. Raises Ig2mjError."""
+    changes, requests = list[Change](), list[ObjectRequest]()
+    for wanted in _listed(objects):
+        if (change := read_change(wanted)) is not None:
+            changes.append(change.canonical)
+        else:
+            requests.append(read_request(wanted))
+    return changes, requests
+
+
+def _load(
+    file: pathlib.Path,
+    manifest: Manifest,
+    agents: Sequence[Agent],
+    requests: list[ObjectRequest],
+    changes: list[Change],
+) -> Scene:
+    folder, additions, removed = file.parent, list[Addition](), tuple[str, ...]()
+    if requests or changes:
         planned = plan_additions(manifest, requests)
-        text, manifest = add_objects(file, manifest, planned)
+        merged = merged_home(file, manifest, changes, planned)
+        manifest, removed = merged.manifest, merged.removed
         additions = [addition for addition, _ in planned]
-        spec = _spec_from_text(text, file)
+        spec = _spec_from_text(ElementTree.tostring(merged.root, encoding="unicode"), file)
     else:
         spec = read_spec(file)
     _make_solid(spec, manifest, folder)
     if agents:
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *_attach_all(agents, spec, manifest)]
-    model = _compile(spec, file, generated=bool(requests))
+    model = _compile(spec, file, generated=bool(requests or changes))
     rooms = None
     if manifest.rooms.file:
         rooms = load_rooms(inside(manifest.rooms.file, folder, folder / MANIFEST_FILE, "rooms.file"))
     tables = build_tables(model, manifest, rooms, folder / MANIFEST_FILE)
-    return Scene(folder, manifest, model, tables, rooms, tuple(agents), tuple(additions))
+    return Scene(folder, manifest, model, tables, rooms, tuple(agents), tuple(additions), tuple(changes), removed)
 
 
 def _attach_all(agents: Sequence[Agent], spec: mujoco.MjSpec, manifest: Manifest) -> list[AgentEntry]:

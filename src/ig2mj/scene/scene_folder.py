@@ -24,17 +24,18 @@ DIGITS = 6
 """Behind the point, of positions (m, rad, unit quaternion): below what separates a resting object from a moving one."""
 
 
-def write_scene_folder(text: str, manifest: Manifest, folder: pathlib.Path, rooms: pathlib.Path | None = None) -> None:
+def write_scene_folder(
+    root: ElementTree.Element, manifest: Manifest, folder: pathlib.Path, rooms: pathlib.Path | None = None
+) -> None:
     """Writes a scene.
 
     Args:
-      text: MJCF whose paths are absolute (`mjcf_text.make_absolute`). folder: there already.
+      root: MJCF whose paths are absolute (`mjcf_text.make_absolute`); it is changed. folder: there already.
       rooms: file of the room maps, which is copied.
 
     Raises:
       InputError: a mesh or a texture cannot be read.
     """
-    root = ElementTree.fromstring(text)
     _drop_unused(root)
     compiler = root.find("compiler")
     if compiler is None:

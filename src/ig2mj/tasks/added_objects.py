@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from ig2mj.errors import Ig2mjError
 from ig2mj.scene.additions import name_additions
+from ig2mj.scene.changes import added, read_change
 from ig2mj.scene.library import find_model
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.object_requests import read_request
@@ -24,7 +25,8 @@ def with_objects(task: AnyTask, objects: Objects) -> AnyTask:
     """The task in its home with these objects, as of `load_scene`.
 
     In an activity of `Task` a predicate such as "@on_top:breakfast_table_0" is a further condition of the start states:
-    each of them has the object in another place. In other tasks it is placed once.
+    each of them has the object in another place. In other tasks it is placed once. "remove:NAME" and
+    "replace:NAME=MODEL" change the home.
 
     Raises:
       UnknownNameError: there is no such object. Ig2mjError: a place is none.
@@ -32,10 +34,12 @@ def with_objects(task: AnyTask, objects: Objects) -> AnyTask:
     references = object_texts(objects)
     if not references:
         return task
-    wanted = [read_request(text) for text in references]
     if not isinstance(task, Task):
         return dataclasses.replace(task, added=references)
-    pairs = list(zip(wanted, references, strict=True))
+    texts = added(references)
+    changes = [text for text in references if text not in texts]
+    wanted = [read_request(text) for text in texts]
+    pairs = list(zip(wanted, texts, strict=True))
     bare = [text if request.predicate is None else text.rpartition("@")[0] for request, text in pairs]
     taken = (o.name for o in load_manifest(scene_folder(task.home)).objects)
     names = [name for name, _ in name_additions(taken, [*task.objects, *bare])][len(task.objects) :]
@@ -44,7 +48,7 @@ def with_objects(task: AnyTask, objects: Objects) -> AnyTask:
         for request, name in zip(wanted, names, strict=True)
         if request.predicate is not None
     ]
-    return dataclasses.replace(task, objects=(*task.objects, *bare), start=(*task.start, *start))
+    return dataclasses.replace(task, objects=(*task.objects, *bare, *changes), start=(*task.start, *start))
 
 
 def object_texts(objects: Objects) -> tuple[str, ...]:
@@ -59,6 +63,8 @@ def object_texts(objects: Objects) -> tuple[str, ...]:
 
 
 def _text(wanted: str | os.PathLike) -> str:
+    if (change := read_change(wanted)) is not None:
+        return change.canonical.text
     request = read_request(wanted)
     model = find_model(request.reference)
     return f"{model.reference}{request.text[len(request.reference) :]}" if model.named else request.text

@@ -77,6 +77,7 @@ def save_pool(pool: Pool, file: str | os.PathLike, scene: Scene, note: dict[str,
         "scene": scene.name,
         "digest": scene.digest,
         "additions": entries_of(scene.additions),
+        "changes": [change.text for change in scene.changes],
     }
     save_tree(file, pool, {**header, **(note or {})})
 
@@ -99,7 +100,8 @@ def load_pool_scene(
     changed = [f"{a.category}/{a.model}" for a in additions if a.find().sha256 != a.sha256]
     if scene is None and header["scene"] not in shipped_homes():
         raise InputError(file, f"is of the home '{header['scene'][:60]}', which does not ship", fix="name its folder")
-    found = load_scene(header["scene"] if scene is None else scene, agents, [a.wanted for a in additions])
+    objects = [*header["changes"], *(a.wanted for a in additions)]
+    found = load_scene(header["scene"] if scene is None else scene, agents, objects)
     if changed and not found.owns(header.get("digest")):
         raise InputError(file, f"was made with another '{changed[0]}' added", fix=_FIX)
     return found
@@ -127,6 +129,8 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
             raise InputError(file, f"is a pool of scene '{header.get('scene')}', not of '{scene.name}'", fix=fix)
         if [a["name"] for a in header["additions"]] != [a.name for a in scene.additions]:
             raise InputError(file, "was made with other objects added", fix="load the scene with `load_pool_scene`")
+        if header["changes"] != [change.text for change in scene.changes]:
+            raise InputError(file, "was made with other changes", fix="load the scene with `load_pool_scene`")
         raise InputError(file, f"was made with another version of the physics of '{scene.name}'", fix=fix)
     arrays = read_arrays(file, "")
     lengths = {len(array) if array.ndim else 0 for array in arrays.values()}
@@ -187,7 +191,7 @@ def _pool_header(file: str | os.PathLike) -> dict[str, Any]:
         known = msgspec.convert(header, _Header)
     except (msgspec.ValidationError, RecursionError) as e:
         raise InputError(file, str(e), element="header", fix=_FIX) from e
-    return {**header, "additions": msgspec.to_builtins(known.additions)}
+    return {**header, "additions": msgspec.to_builtins(known.additions), "changes": known.changes}
 
 
 class _Header(msgspec.Struct):
@@ -196,3 +200,4 @@ class _Header(msgspec.Struct):
     scene: str
     digest: str | None = None
     additions: list[AdditionEntry] = []
+    changes: list[str] = []

@@ -1,13 +1,18 @@
-"""The option `--object` of every command that loads a home, several times: what is added to it."""
+"""The options `--object`, `--remove` and `--replace` of every command that loads a home, several times each: what is
+added to it, what is taken out of it, and what takes the place of what.
+"""
 
 from __future__ import annotations
 
+import inspect
 import os
 import sys
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
+
+from ig2mj.errors import Ig2mjError
 
 if TYPE_CHECKING:
     from ig2mj.scene.scene import Agent, Scene
@@ -20,8 +25,36 @@ AddedObjects = Annotated[
 HELP = (
     "add an object, several times: a folder that `ig2mj convert object` wrote, or a name of the object library "
     "(`ig2mj objects list`), with the place where it starts: obj/mug@on_top:breakfast_table_0, or obj/mug@1,2,0.8,90 "
-    "(metres, degrees); docs/guide/objects.md"
+    "(metres, degrees); docs/guide/objects.md. --remove NAME takes an object of the home out, with what stands on it; "
+    "--replace NAME=DIR|NAME puts another one in its place"
 )
+
+CHANGES = ("--remove", "--replace")
+"""Options that are written as values of `--object`: remove:NAME, replace:NAME=MODEL."""
+
+
+def with_changes(function: Callable[..., Any], args: Sequence[str]) -> list[str]:
+    """A command line whose changes of the home are values of `--object`, where the function has that option.
+
+    Raises:
+      Ig2mjError: an option lacks its value.
+    """
+    if "object" not in inspect.signature(function).parameters:
+        return list(args)
+    out, waiting = list[str](), list(args)
+    while waiting:
+        word = waiting.pop(0)
+        option, equals, value = word.partition("=")
+        if option not in CHANGES:
+            out.append(word)
+            continue
+        if not equals:
+            if not waiting or waiting[0].startswith("--"):
+                form = "NAME" if option == CHANGES[0] else "NAME=DIR, or NAME=MODEL"
+                raise Ig2mjError(f"{option} needs a value: {option} {form}")
+            value = waiting.pop(0)
+        out += ["--object", f"{option.removeprefix('--')}:{value}"]
+    return out
 
 
 def load_home(scene: str | os.PathLike, objects: Sequence[str] = (), agents: Sequence[Agent] = ()) -> Scene:
@@ -35,8 +68,10 @@ def load_home(scene: str | os.PathLike, objects: Sequence[str] = (), agents: Seq
 
 def note_absent(scene: Scene, objects: Sequence[str]) -> None:
     """Says on stderr which of the objects of a command line stand outside the house, and how to place them."""
+    from ig2mj.scene.changes import added
     from ig2mj.scene.object_requests import read_request
 
+    objects = added(objects)
     given = scene.additions[-len(objects) :] if objects else ()
     absent = [(a, text) for a, text in zip(given, objects, strict=True) if a.place is None and a.start is None]
     for addition, text in absent:

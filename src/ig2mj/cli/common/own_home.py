@@ -134,7 +134,7 @@ def _add(home: OwnHome, work: pathlib.Path, folder: pathlib.Path) -> None:
     """Writes the converted scene with what the dataset does not have: furniture from folders and loose objects."""
     import msgspec
 
-    from ig2mj.scene.additions import Addition, add_objects
+    from ig2mj.scene.additions import Addition, add_objects, read_absolute
     from ig2mj.scene.library import read_model
     from ig2mj.scene.manifest import load_manifest
     from ig2mj.scene.scene_folder import ROOMS_FILE, write_scene_folder
@@ -149,13 +149,14 @@ def _add(home: OwnHome, work: pathlib.Path, folder: pathlib.Path) -> None:
     for loose in home.loose:
         model = read_model(_converted(loose, work), named=True)
         planned.append((Addition(loose.name, model.category, model.model, model.sha256), model))
-    text, manifest = add_objects(converted / "scene.xml", load_manifest(converted), planned)
+    root = read_absolute(converted / "scene.xml")
+    manifest = add_objects(root, load_manifest(converted), planned)
     rooms = {piece.name: list(piece.rooms) for piece in home.pieces}
     manifest.objects = [
         msgspec.structs.replace(o, rooms=rooms[o.name]) if o.name in rooms else o for o in manifest.objects
     ]
     manifest.source = {**manifest.source, "file": pathlib.Path(home.description.file).name}
-    write_scene_folder(text, manifest, folder, converted / ROOMS_FILE)
+    write_scene_folder(root, manifest, folder, converted / ROOMS_FILE)
 
 
 def _converted(loose: Any, work: pathlib.Path) -> pathlib.Path:

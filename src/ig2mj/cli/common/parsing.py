@@ -11,13 +11,13 @@ import tyro
 
 from ig2mj.agents.registry import ROBOTS
 from ig2mj.cli.common.deprecated import with_new_names
-from ig2mj.cli.common.objects import HELP
+from ig2mj.cli.common.objects import HELP, with_changes
 from ig2mj.errors import Ig2mjError
 
 
 def parse_and_call(function: Callable[..., Any], prog: str, args: Sequence[str]) -> Any:
     """The function's result for the arguments of the command line. Raises SystemExit, as tyro does."""
-    args = with_new_names(function, prog, args)
+    args = with_changes(function, with_new_names(function, prog, args))
     _check_options(function, prog, args)
     return tyro.cli(_with_quiet_defaults(function), prog=prog, args=args, config=(tyro.conf.DisallowNone,))
 
