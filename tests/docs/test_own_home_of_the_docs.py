@@ -45,7 +45,7 @@ def test_the_home_passes_all_checks_and_has_what_the_file_says(folder):
     scene = ig2mj.load_scene(folder / "my_home")
     checks = json.loads((folder / "my_home" / "checks.json").read_text())
     assert [c["name"] for c in checks if not c["passed"]] == []
-    assert {c["name"] for c in checks} >= {"settle", "penetration", "joint_clearance", "reachable"}
+    assert {c["name"] for c in checks} >= {"settle", "penetration", "joint_clearance", "opens", "reachable"}
     assert {"fridge", "table", "side_table", "cup", "plate_0", "plate_1", "book"} <= set(scene.object_names)
     assert scene.object("side_table").fixed and scene.object("side_table").rooms == ["living_room_0"]
     assert scene.rooms is not None and set(scene.rooms.names) == {"kitchen_0", "living_room_0", "bathroom_0"}

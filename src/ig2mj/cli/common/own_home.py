@@ -12,6 +12,7 @@ import json
 import os
 import pathlib
 import tempfile
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from ig2mj.sampling.conditions import Condition
     from ig2mj.sampling.row import Row, RowSampler
+    from ig2mj.scene.manifest import ObjectEntry
     from ig2mj.scene.scene import Scene
 
 MAX_HULLS = 16
@@ -40,7 +42,8 @@ class MadeHome:
 
     Attributes:
       folder: of the home. rooms: their names. objects: name -> category of all that is in use, without the building.
-      checks: of the converter, and `reachable`: a robot of 0.3 m radius reaches every room and doorway.
+      checks: of the converter; `opens`: what opens does so under 20 N or 5 N m, and stays open and half-open;
+        `reachable`: a robot of 0.3 m radius reaches every room and doorway.
     """
 
     folder: pathlib.Path
@@ -278,6 +281,8 @@ def _check(home: OwnHome, folder: pathlib.Path, closed: mujoco.MjModel) -> list[
 
     checks = run_checks(_compiled(folder), load_manifest(folder), closed=closed)
     scene = _scene(folder)
+    own = {piece.name for piece in home.pieces} | {loose.name for loose in home.loose}
+    checks.append(_opens(closed, [o for o in scene.manifest.objects if o.name not in own and not o.parked]))
     query = SceneQuery(scene)
     names = {loose.name for loose in home.loose}
     boxes = [query.box(k) for k, name in enumerate(scene.object_names) if name in names]
@@ -289,3 +294,23 @@ def _check(home: OwnHome, folder: pathlib.Path, closed: mujoco.MjModel) -> list[
     text = json.dumps(kept, indent=1, default=lambda value: value.tolist()) + "\n"
     (folder / "checks.json").write_text(text, encoding="utf-8", newline="\n")
     return checks
+
+
+def _opens(model: mujoco.MjModel, entries: Sequence[ObjectEntry]) -> CheckResult:
+    """Whether everything that opens does; hinges of one's own objects are as their makers want them."""
+    from ig2mj_converters.base.outcome import CheckResult
+    from ig2mj_homes.objects.opening_strength import open_joint
+
+    opened = {
+        o.name: result
+        for o in entries
+        for result in (open_joint(model, j.joint, j.closed, j.open) for j in o.openable)
+        if not result.works
+    }
+    count = sum(len(o.openable) for o in entries)
+    failures = [
+        {"object": name, "problem": f"{r.joint} opens to {r.reached:.0%}" + (f" and meets {r.met[0]}" if r.met else "")}
+        for name, r in opened.items()
+    ]
+    text = f"{count - len(failures)} of {count} joints open under 20 N or 5 N m and stay open"
+    return CheckResult("opens", not failures, text, failures)
