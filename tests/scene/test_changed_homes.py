@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import mujoco
 import numpy as np
 import pytest
 from own_objects import write_table
@@ -23,10 +24,10 @@ def table(tmp_path_factory):
 
 def drift(scene) -> float:
     """m that the object that moves most moves in half a second."""
-    simulation = ig2mj.Simulation(scene, states=None)
-    before = np.array(simulation.view.object_pos[0])
-    simulation.step(count=15)
-    return float(np.linalg.norm(np.array(simulation.view.object_pos[0]) - before, axis=1).max())
+    data = scene.start_data()
+    before = data.xpos.copy()
+    mujoco.mj_step(scene.model, data, nstep=60)
+    return float(np.linalg.norm(data.xpos - before, axis=1).max())
 
 
 def test_a_removed_object_takes_with_it_what_stands_on_or_in_it():
@@ -67,8 +68,9 @@ def test_a_replacement_has_the_name_the_room_and_the_place_of_the_old_one(table)
 def test_what_stood_on_the_old_object_stands_on_the_new_one_where_there_is_room(table):
     scene = ig2mj.load_scene("small_home", replace={"breakfast_table_0": table})
     assert "plate_0" not in scene.removed and {"bowl_0", "apple_0"} <= set(scene.removed)
-    simulation = ig2mj.Simulation(scene)
-    assert simulation.predicate("on_top", "plate_0", "breakfast_table_0")
+    data = scene.start_data()
+    plate, top = data.body("plate_0").xpos, data.body("breakfast_table_0").xpos[2] + 0.5
+    assert top - 0.01 < plate[2] < top + 0.05, "it was higher on the old one"
     assert drift(scene) < 0.005
 
 
@@ -81,6 +83,7 @@ def test_changes_are_values_of_objects_that_give_the_same_scene_again(table):
     assert scene.spec().compile().nq == scene.model.nq
 
 
+@pytest.mark.slow
 def test_pools_know_the_changes_of_their_home(tmp_path, capsys):
     file = tmp_path / "pool.npz"
     line = ["sample", "small_home", "(on_top mug_0 coffee_table_0)", "--count", "1", "--remove", "hardback_0"]
@@ -111,7 +114,6 @@ def test_commands_take_changes(table, capsys):
         ({"replace": {"mug_0": "nothing"}}, "no category of the object library is named 'nothing'"),
         ({"replace": {"bowl_0": "pool"}}, "the object in place of 'bowl_0' stands"),
         ({"replace": {"mug_0": "ladder"}}, "'mug_0' does not come to rest"),
-        ({"replace": ["mug_0"]}, "a mapping of names"),
         ({"objects": "replace:mug_0"}, "write remove:NAME, or replace:NAME=MODEL"),
     ],
 )
