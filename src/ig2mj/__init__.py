@@ -16,17 +16,25 @@ if TYPE_CHECKING:
     from ig2mj.learn.policies import Policy
     from ig2mj.scene.scene import Scene, load_scene
     from ig2mj.simulation import Simulation
+    from ig2mj.tasks.custom.definition import CustomTask, register_task
+    from ig2mj.tasks.custom.start import StartWorld
+    from ig2mj.tasks.custom.view import TaskView
+    from ig2mj.tasks.task import Acts
     from ig2mj.worlds import Worlds
 
     __version__: str
 
 __all__ = [
+    "Acts",
+    "CustomTask",
     "EnvConfig",
     "EnvState",
     "Environment",
     "Policy",
     "Scene",
     "Simulation",
+    "StartWorld",
+    "TaskView",
     "Worlds",
     "default_config",
     "errors",
@@ -34,21 +42,27 @@ __all__ = [
     "load_scene",
     "make",
     "record",
+    "register_task",
 ]
 
 _HOME = {
+    "Acts": "ig2mj.tasks.task",
+    "CustomTask": "ig2mj.tasks.custom.definition",
     "EnvConfig": "ig2mj.envs.config",
     "EnvState": "ig2mj.envs.state",
     "Environment": "ig2mj.envs.environment",
     "Policy": "ig2mj.learn.policies",
     "Scene": "ig2mj.scene.scene",
     "Simulation": "ig2mj.simulation",
+    "StartWorld": "ig2mj.tasks.custom.start",
+    "TaskView": "ig2mj.tasks.custom.view",
     "Worlds": "ig2mj.worlds",
     "default_config": "ig2mj.envs.registry",
     "list_envs": "ig2mj.envs.registry",
     "load_scene": "ig2mj.scene.scene",
     "make": "ig2mj.envs.registry",
     "record": "ig2mj.demos.environments",
+    "register_task": "ig2mj.tasks.custom.definition",
 }
 
 

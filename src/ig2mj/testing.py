@@ -20,6 +20,7 @@ from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import ActionError, StaleStateError
 from ig2mj.process import entry_point
 from ig2mj.sensors.registry import SENSORS
+from ig2mj.tasks.custom.objective import CustomObjective
 
 SOON = 3
 """Steps of the short episodes in which the end of an episode is looked at."""
@@ -49,6 +50,8 @@ def api_test(
     - `final_obs` is what was seen before the reset;
     - numbers of an action that are not finite are refused on the host, on a device counted and taken for 0; a wrong
       shape is refused;
+    - functions of the user's (`ig2mj.CustomTask`) give the same when they are called again, and a world's values do not
+      depend on other worlds;
     - a stale state is refused by everything that takes a state; a fork of a state and a state from a file go
       on as the state itself, whatever was done to the others in between;
     - nothing is compiled again at the second reset and the second step; closing twice is harmless.
@@ -81,6 +84,7 @@ def api_test(
     _partial_reset(env, seed, actions, like)
     _ends(env, seed, actions[0], like)
     _bad_actions(env, seed, like)
+    _own_functions(env, seed, actions)
     _copies(env, seed, actions, like)
     env.close()
     env.close()
@@ -218,6 +222,17 @@ def _bad_actions(env: Environment, seed: int, like: Likeness) -> None:
         except ActionError:
             continue
         raise AssertionError(f"an action {what} was taken")
+
+
+def _own_functions(env: Environment, seed: int, actions: list[np.ndarray]) -> None:
+    """Rewards, ends and observations of the user's, on values of some steps."""
+    if not isinstance(env.objective, CustomObjective):
+        return
+    state = env.reset(seed)
+    for action in actions:
+        state = env.step(state, action)
+    world = state.batch.world
+    env.objective.check_pure(*jax.tree.map(np.asarray, (world.view, world.states, state.status)))
 
 
 def _copies(env: Environment, seed: int, actions: list[np.ndarray], like: Likeness) -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import pathlib
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from ig2mj.cli.common.tasks import task_option
 
 if TYPE_CHECKING:
     from ig2mj.learn.bc import BCConfig
@@ -25,7 +28,6 @@ def train_from_demos(
     import jax
 
     from ig2mj.agents.registry import robot_name
-    from ig2mj.envs.names import short_name
     from ig2mj.errors import Ig2mjError, InputError
     from ig2mj.learn.bc import BC, clone
     from ig2mj.learn.demos import about, load_demos
@@ -38,7 +40,7 @@ def train_from_demos(
         raise Ig2mjError("--algo bc needs --demos (`ig2mj demos collect` writes such files)")
     world, spaces = about(demos)
     for name, wanted in (
-        ("task", short_name(chosen.env) or chosen.env),
+        ("task", _task_name(chosen.env, world, demos)),
         ("robot", None if chosen.robot is None else robot_name(chosen.robot)),
         ("grasping", chosen.grasping),
     ):
@@ -68,5 +70,22 @@ def train_from_demos(
     file = folder / "policy.npz"
     Policy.of(algorithm, learner, depends, made).save(file)
     print(file)
-    print(f"to evaluate it on held-out start states: ig2mj evaluate {file}", file=sys.stderr)
+    option = task_option(chosen.env)
+    print(f"to evaluate it on held-out start states: ig2mj evaluate {file}{option}", file=sys.stderr)
     return 0
+
+
+def _task_name(env: str, world: Mapping[str, Any], demos: str) -> str:
+    """The name of an environment's task, as recordings have it. Raises InputError: theirs is another version of it."""
+    from ig2mj.envs.names import short_name
+    from ig2mj.errors import InputError
+    from ig2mj.tasks.registry import split_reference
+
+    if split_reference(env) is None:
+        return short_name(env) or env
+    from ig2mj.tasks.custom.files import task_of_file
+
+    task = task_of_file(env)
+    if task.code is not None and world.get("task_code") not in (None, task.code.digest):
+        raise InputError(demos, f"what determines {task.name} in {world.get('task_file')} has changed since")
+    return task.name

@@ -39,7 +39,8 @@ def collect(
     `ig2mj train --demos` learns from the recording; `ig2mj demos replay`, `metrics`, `export` and `ig2mj web` read it.
 
     Args:
-      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
+      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them), or a task of a file of
+        yours: my_tasks.py:MugToTable.
       out: output file.
       episodes: number of successful episodes to collect.
       robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first robot.

@@ -8,6 +8,8 @@ from typing import Annotated, Any
 
 import tyro
 
+from ig2mj.cli.common.tasks import TaskOption, use_task
+
 ENDINGS = (".h5", ".hdf5")
 
 
@@ -17,6 +19,7 @@ def metrics(
     settle: int = 150,
     success_only: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     include_incomplete: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    task: TaskOption = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
     """Compute iGibson's metrics of recordings: goal score, disarrangement, distance travelled, grasping, gaze.
@@ -29,6 +32,7 @@ def metrics(
       settle: control steps to wait before start and end are compared; 0: compare them as recorded.
       success_only: measure successful episodes only.
       include_incomplete: measure episodes that were cut off, too.
+      task: the recordings' task, if it is defined in a file of yours; this imports the file.
       json: print one JSON object per run.
     """
     import json as form
@@ -38,6 +42,7 @@ def metrics(
 
     if jobs < 1 or settle < 0:
         raise Ig2mjError(f"--jobs {jobs}, --settle {settle}: at least one process, and no less than 0 steps")
+    use_task(task)
     failed, chosen = 0, (success_only, include_incomplete)
     options = {"settle": settle, "success_only": success_only, "incomplete": include_incomplete}
     for file, found in of_files("ig2mj.demos.metrics:metrics_job", files_of(path), jobs, **options):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
+from ig2mj.cli.common.tasks import TaskOption, use_task
 
 if TYPE_CHECKING:
     from ig2mj.cluster.job_runner import Where
@@ -27,6 +28,7 @@ def replay(
     jobs: int = 1,
     cluster: Cluster = None,
     resume: Resume = False,
+    task: TaskOption = None,
 ) -> int:
     """Replay a recording of an environment (`ig2mj rollout --record FILE`), or all recordings of a folder.
 
@@ -42,6 +44,7 @@ def replay(
       jobs: number of processes; each takes one recording at a time.
       cluster: run on a Ray cluster, one job per run: its address, or auto.
       resume: continue an interrupted replay.
+      task: the recording's task, if it is defined in a file of yours; this imports the file.
     """
     import sys
 
@@ -54,6 +57,7 @@ def replay(
         raise UnknownNameError("way to replay", by, MODES)
     if threads < 0 or jobs < 1:
         raise Ig2mjError(f"--threads {threads}, --jobs {jobs}: 0 threads or more, and 1 process or more are possible")
+    use_task(task)
     files = files_of(file)
     if len(files) > 1 and (video is not None or out is not None):
         raise Ig2mjError("--video and --out are of one recording: name a file")
@@ -190,6 +194,7 @@ def export(
     obs: str = "",
     success_only: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     include_incomplete: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    task: TaskOption = None,
 ) -> int:
     """Export a recording to another project's format, with observations computed by a replay.
 
@@ -203,6 +208,7 @@ def export(
       obs: observations, e.g. proprioception,rgb; default: those of the recorded environment. igibson has none.
       success_only: export successful episodes only.
       include_incomplete: export episodes that were cut off, too.
+      task: the recording's task, if it is defined in a file of yours; this imports the file.
     """
     import sys
 
@@ -217,6 +223,7 @@ def export(
     for kind, name, known in (("format", to, tuple(EXPORTS)), ("way to replay", by, MODES)):
         if name not in known:
             raise UnknownNameError(kind, name, known)
+    use_task(task)
     names = tuple(name.strip() for name in obs.split(",") if name.strip())
     if to == "robomimic":
         check_output(out)

@@ -11,6 +11,7 @@ from ig2mj.cli.common.deprecated import renamed_options
 from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
 from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
+from ig2mj.cli.common.tasks import TaskOption, use_task
 
 WORLDS = {"native": 8}
 """So many worlds unless another number is asked for; on the others as many as episodes, up to `PURE_WORLDS`."""
@@ -35,6 +36,7 @@ def run(
     cluster: Cluster = None,
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     resume: Resume = False,
+    task: TaskOption = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
     """Measure how often a policy succeeds, on start states that it was not trained on.
@@ -57,6 +59,7 @@ def run(
       cluster: run on a Ray cluster: its address, or auto.
       out: file for the JSON result; needed for --resume.
       resume: continue an interrupted evaluation.
+      task: the policy's task, if it is defined in a file of yours; this imports the file.
       json: print one JSON object.
     """
     import contextlib
@@ -74,6 +77,7 @@ def run(
     from ig2mj.learn.evaluate import evaluation_jobs, summary
     from ig2mj.learn.policies import Policy, objects_of, robot_of
     from ig2mj.learn.shipped import find_policy
+    from ig2mj.tasks.custom.files import refuse_unknown
     from ig2mj.tasks.pools import COUNT
 
     if episodes < 1 or min(jobs, worlds) < 0:
@@ -84,9 +88,11 @@ def run(
         raise Ig2mjError("--resume needs --out FILE: finished jobs are stored next to it")
     if out is not None:
         check_output(out)
+    use_task(task)
     file = find_policy(policy)
     loaded = Policy.load(file)
     depends = loaded.card["depends"]
+    refuse_unknown(depends["task"], depends.get("task_file"), file)
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
     count = worlds or min(episodes, WORLDS.get(engine, PURE_WORLDS))

@@ -33,7 +33,8 @@ def run(
     Ctrl and the right button by a spring of at most 100 N, and push it with P, as in iGibson's viewer.
 
     Args:
-      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
+      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them), or a task of a file of
+        yours: my_tasks.py:MugToTable.
       robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first robot.
       grasping: assisted, sticky, physical or mitten (docs/guide/environments.md); default: assisted, for robots with
         hands.

@@ -46,7 +46,8 @@ def run(
     """Play episodes of an environment and report how they ended.
 
     Args:
-      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
+      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them), or a task of a file of
+        yours: my_tasks.py:MugToTable.
       agent: zero (no motion), random, expert (scripted; the six activities have one), or a policy: a file written by
         `ig2mj train`, or the name of one that ships.
       robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first robot.

@@ -34,7 +34,7 @@ def run(
     which rounds contacts differently.
 
     Args:
-      task: e.g. CookingMeat or ig2mj/CookingMeat-v0; all: both splits of every activity.
+      task: e.g. CookingMeat, ig2mj/CookingMeat-v0 or my_tasks.py:MugToTable; all: both splits of every activity.
       split: train, or held_out for evaluation (other seeds).
       count: number of rows; 0: 512 for train, 1000 for held_out. A smaller number gives the first rows of a larger one.
       jobs: number of processes; 0: one per processor.

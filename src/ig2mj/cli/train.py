@@ -10,6 +10,7 @@ import tyro
 from ig2mj.cli.common.deprecated import renamed_options
 from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
+from ig2mj.cli.common.tasks import task_option
 
 if TYPE_CHECKING:
     from ig2mj.learn.run_config import RunOptions, RunSettings
@@ -62,7 +63,8 @@ def run(
     """Train a policy in an environment.
 
     Args:
-      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
+      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them), or a task of a file of
+        yours: my_tasks.py:MugToTable.
       config: TOML file of a run, or the name of a policy that ships, which is trained again; other options override
         what the file says.
       set: settings of the algorithm and of the run, e.g. utd_ratio=16 actor_layers=128,128 engine=native
@@ -230,7 +232,8 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
             return 0
         videos.offer(best.file, result.row["seconds"], last=True)
         print(best.file)
-        print(f"to evaluate it on held-out start states: ig2mj evaluate {best.file}", file=sys.stderr)
+        option = task_option(chosen.env)
+        print(f"to evaluate it on held-out start states: ig2mj evaluate {best.file}{option}", file=sys.stderr)
         return 0
 
 

@@ -37,7 +37,8 @@ class TrainingVideos:
         """Of an environment in which a policy is trained; none where `every` is 0."""
         from ig2mj.tasks.added_objects import object_texts
 
-        chosen = [env.task.name, "--robot", _robot(env), "--grasping", env.grasping]
+        name = env.task.name if env.task.code is None else env.task.code.reference
+        chosen = [name, "--robot", _robot(env), "--grasping", env.grasping]
         chosen += [f"--object={text}" for text in object_texts(env.config.objects)]
         return cls(run, every, chosen + ["--relaxed-thresholds"] * relaxed_thresholds)
 

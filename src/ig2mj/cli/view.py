@@ -10,6 +10,7 @@ import tyro
 from ig2mj.cli.common.deprecated import renamed_options
 from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
+from ig2mj.cli.common.tasks import TaskOption, use_task
 from ig2mj.errors import Ig2mjError
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def run(
     own: Own = NONE,
     robot_at: Annotated[Vec3, tyro.conf.arg(metavar="X Y DEGREES")] = (0.0, 0.0, 0.0),
     policy: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None,
+    task: TaskOption = None,
 ) -> None:
     """Open a scene in MuJoCo's viewer, or write an image of it.
 
@@ -68,13 +70,17 @@ def run(
       robot_at: its position (metres) and its angle from the x axis (degrees).
       policy: instead of a scene: watch a trained policy, by the name of one that ships (`ig2mj policies list`) or the
         folder of a run.
+      task: the policy's task, if it is defined in a file of yours; this imports the file.
     """
     if policy is not None:
         from ig2mj.cli.view_policy import view_policy
 
+        use_task(task)
         _only_policy(scene, image, dump, pool, camera, eye, target, seconds, collision, object)
         view_policy(policy, video, row, paused)
         return
+    if task is not None:
+        raise Ig2mjError("--task is of a policy: it needs --policy")
     if scene is None:
         raise Ig2mjError("name a scene, or a policy with --policy (`ig2mj homes list` names homes)")
     robot = choose_robot(robot, own)

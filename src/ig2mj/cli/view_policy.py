@@ -29,6 +29,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
     from ig2mj.learn.policies import Policy, objects_of, robot_of
     from ig2mj.learn.shipped import find_policy
     from ig2mj.showcase.film_strip import ENDINGS
+    from ig2mj.tasks.custom.files import refuse_unknown
     from ig2mj.tasks.pools import COUNT
     from ig2mj.viewer.acting import BETWEEN, ActingWorld
     from ig2mj.viewer.interactive import check_display, launch
@@ -42,6 +43,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
         check_video(video, ENDINGS)
     policy = Policy.load(file)
     depends = policy.card["depends"]
+    refuse_unknown(depends["task"], depends.get("task_file"), file)
     env = make(
         depends["task"],
         robot_of(policy.card),

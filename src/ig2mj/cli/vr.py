@@ -36,7 +36,8 @@ def run(
     """Do a task yourself, in a headset or with mouse and keyboard. Ctrl-C ends it.
 
     Args:
-      task: a task of the humanoid, e.g. CookingMeat or activity/cleaning_windows (`ig2mj list-envs` names them).
+      task: a task of the humanoid, e.g. CookingMeat or activity/cleaning_windows (`ig2mj list-envs` names them), or one
+        of a file of yours: my_tasks.py:MugToTable.
       record: HDF5 file to record the session and your devices to, for `ig2mj demos replay`.
       device: page: a web page for a headset's browser (WebXR) or for mouse and keyboard; openxr: a headset attached to
         this machine; recorded: play back the devices of --poses.

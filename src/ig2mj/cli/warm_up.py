@@ -36,7 +36,7 @@ def run(
     there.
 
     Args:
-      what: a home or the folder of a scene, or an environment (`ig2mj list-envs`).
+      what: a home or the folder of a scene, or an environment (`ig2mj list-envs`, or FILE.py:NAME of yours).
       worlds: number of worlds; programs are compiled for this number.
       robot: for an environment: its robot, or a folder that `ig2mj convert robot` wrote; default: the task's first.
       grasping: for an environment: mitten, assisted, sticky or physical.
@@ -89,18 +89,18 @@ class Batch:
     def make(self, pool_size: int | None = None) -> Worlds | Environment:
         """Raises Ig2mjError: a home with options of environments."""
         import ig2mj
-        from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
-        from ig2mj.envs.registry import VECTORS
+        from ig2mj.envs.names import NAMESPACE
+        from ig2mj.envs.registry import VECTORS, is_environment, list_envs
         from ig2mj.errors import Ig2mjError, UnknownNameError
         from ig2mj.scene.paths import SHIPPED_HOMES, shipped_homes
 
-        if short_name(self.what) is not None or activity_name(self.what) is not None:
+        if is_environment(self.what):
             seen = (*VECTORS, *self.observations)
             options: dict[str, Any] = {"observations": seen, "pool_size": pool_size, "objects": self.objects}
             return ig2mj.make(self.what, self.robot, self.worlds, self.engine, self.grasping, **options)
         if not (pathlib.Path(self.what).exists() or (SHIPPED_HOMES / self.what).is_dir()):
             short = self.what.removeprefix(f"{NAMESPACE}/")
-            raise UnknownNameError("home or environment", short, (*shipped_homes(), *NAMES))
+            raise UnknownNameError("home or environment", short, (*shipped_homes(), *list_envs()))
         if self.robot is not None or self.grasping is not None or self.observations:
             raise Ig2mjError("--robot, --grasping and --observations belong to environments; a home is stepped without")
         return ig2mj.Worlds(self.what, self.worlds, self.engine, objects=self.objects)

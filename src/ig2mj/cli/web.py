@@ -9,6 +9,7 @@ import tyro
 
 from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
+from ig2mj.cli.common.tasks import TaskOption, use_task
 from ig2mj.errors import Ig2mjError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ def run(
     own: Own = NONE,
     seed: int = 0,
     object: AddedObjects = (),
+    task: TaskOption = None,
     paused: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
     """Show a scene, an environment or a recording in the browser.
@@ -42,7 +44,7 @@ def run(
 
     Args:
       what: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj; or an environment
-        (`ig2mj list-envs`); or a recording (`ig2mj rollout --record FILE`).
+        (`ig2mj list-envs`, or FILE.py:NAME of yours); or a recording (`ig2mj rollout --record FILE`).
       port: port of the page; 0: any free port.
       host: additional address to listen on, e.g. 0.0.0.0; needs --token.
       token: secret that the page asks for, at least 16 letters and digits; auto: a random one.
@@ -58,6 +60,7 @@ def run(
       robot: for an environment: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first.
       seed: for an environment: random seed of start states and actions.
       object: {object}.
+      task: for a recording: its task, if it is defined in a file of yours; this imports the file.
       paused: start paused.
     """
     import sys
@@ -81,6 +84,7 @@ def run(
     print(f"loading {what}; the address of the page follows", file=sys.stderr, flush=True)
     from ig2mj.web.viewer import WebViewer
 
+    use_task(task)
     source = _source(what, goal, set, pool, worlds, engine, agent, robot, seed, object)
     with WebViewer(source, access, playing=not paused, title=f"ig2mj: {pathlib.Path(what).name}") as viewer:
         print(viewer.url, flush=True)
@@ -99,14 +103,15 @@ def _source(
     seed: int,
     objects: tuple[str, ...] = (),
 ) -> Source:
-    from ig2mj.envs.names import NAMES, activity_name, short_name
+    from ig2mj.envs.registry import is_environment, list_envs
     from ig2mj.scene.paths import SHIPPED_HOMES, shipped_homes
 
     file = pathlib.Path(what)
     recorded = file.suffix.lower() in _RECORDINGS
-    task = not recorded and not file.exists() and (short_name(what) or activity_name(what)) is not None
+    own = what.endswith(".py") or ".py:" in what  # a task of a file of the user's
+    task = not recorded and (own or not file.exists()) and is_environment(what)
     if not (recorded or task or file.exists() or (SHIPPED_HOMES / what).is_dir()):
-        raise UnknownNameError("scene, environment or recording", what, (*shipped_homes(), *NAMES))
+        raise UnknownNameError("scene, environment or recording", what, (*shipped_homes(), *list_envs()))
     if (recorded or task) and (goal is not None or set or pool is not None):
         raise Ig2mjError("--goal, --set and --pool are for a scene; tasks and recordings have their own")
     if not task and (agent != "zero" or robot is not None):

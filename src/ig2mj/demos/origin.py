@@ -70,6 +70,9 @@ def origin_of(env: Environment, version: int = FORMAT_VERSION) -> dict[str, Any]
         "substeps": engine.substeps,
         "timestep": engine.timestep,
     }
+    code = env.task.code
+    if code is not None:
+        own |= code.in_files
     return own | origin_of_scene(env.scene, version) | origin_of_machine()
 
 
@@ -115,10 +118,16 @@ def pool_hash(pool: Pool) -> str:
 def differences(recorded: Mapping[str, Any], here: Mapping[str, Any], names: tuple[str, ...]) -> list[str]:
     """Attributes that differ, as text with both values. Attributes that the recording lacks are not compared."""
     return [
-        f"{name} was {recorded.get(name)!s}, and is {here.get(name)!s} here"
+        _difference(name, recorded, here)
         for name in names
         if name in here and name in recorded and not _equal(recorded[name], here[name])
     ]
+
+
+def _difference(name: str, recorded: Mapping[str, Any], here: Mapping[str, Any]) -> str:
+    if name == "task_hash" and "task_file" in recorded:
+        return f"what determines {recorded.get('task')!s} in {recorded['task_file']!s} has changed since"
+    return f"{name} was {recorded.get(name)!s}, and is {here.get(name)!s} here"
 
 
 def is_plain(value: object) -> bool:

@@ -42,6 +42,7 @@ from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.scene.changes import added
 from ig2mj.scene.found_again import requests_again
+from ig2mj.tasks.custom.files import refuse_unknown
 from ig2mj.tasks.task import Task
 
 MODES = ("action", "state")
@@ -318,7 +319,9 @@ def _environment(recording: Recording, observations: str | Sequence[str], option
         problem = f"is {worlds}, and a recording has 1 to {MOST_WORLDS} worlds"
         raise InputError(recording.file, problem, element="attribute worlds")
     try:
-        task = find_task(recording.value("task", str))
+        name = recording.value("task", str)
+        refuse_unknown(name, recording.header.get("task_file"), recording.file)
+        task = find_task(name)
         if isinstance(task, Task):
             made = {**made, "pool_size": 1, "augment_starts": 0}
         env = make(task, robot, worlds, engine, grasping, observations=observations, **(made | options))

@@ -18,6 +18,7 @@ import numpy as np
 
 from ig2mj.predicates import logic
 from ig2mj.tasks import points
+from ig2mj.tasks.custom.code import TaskCode
 from ig2mj.tasks.task import TaskLike
 
 KINDS: dict[type, str] = {
@@ -57,6 +58,8 @@ def task_hash(task: TaskLike, robot: str = "", objects: Sequence[str] = ()) -> s
     """
     places = {name: f"#{place}" for place, name in enumerate(objects)}
     fields = [f for f in dataclasses.fields(task) if f.name not in ELSEWHERE and _counts(f, task)]
+    if task.code is not None and task.code.file.endswith(".bddl"):  # all of it is in the binding
+        fields = [f for f in fields if f.name != "code"]
     values = {f.name: getattr(task, f.name) for f in fields}
     robots = values.pop("robots", None)
     if isinstance(robots, Mapping):
@@ -88,6 +91,8 @@ def _named(value: Any, places: Mapping[str, str]) -> Any:
         return sorted((_named(v, places) for v in value), key=json.dumps)
     if isinstance(value, Sequence):
         return [_named(v, places) for v in value]
+    if isinstance(value, TaskCode):
+        return value.digest
     if dataclasses.is_dataclass(value):
         own = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if _counts(f, value)}
         return {"kind": KINDS.get(type(value), ""), **_named(own, places)}

@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
 
 from ig2mj.agents.base import ACTION_PERIOD
@@ -73,7 +73,9 @@ class Overrides(EngineOptions, total=False):
     worlds: int
     engine: str | None
     grasping: str | None
-    observations: str | Sequence[str]
+    observations: str | Sequence[str | Callable[..., Any]]
+    reward: Callable[..., Any] | None
+    terminated: Callable[..., Any] | None
     relaxed_thresholds: bool
     pool: Pool | None
     split: str
@@ -125,7 +127,11 @@ class EnvConfig:
         "assisted", "sticky" or "physical"; with the last three an action of an activity also closes hands. None:
         "mitten" for the paper's activities, "assisted" for others, "physical" for navigation.
       observations: names of sensors and of the task's own vectors, or a single one (`ig2mj.envs.observations`). Images
-        and laser scans need the native or the warp engine.
+        and laser scans need the native or the warp engine. A function of a `ig2mj.TaskView` that gives [W, n] is an
+        observation of its own name.
+      reward: function of a `ig2mj.TaskView` that gives the step's reward, [W], or its terms by name, in place of the
+        task's. terminated: likewise, in which worlds the episode ends, in place of the task's ends; `info["success"]`
+        stays the task's. Both are pure (`ig2mj.CustomTask`).
       relaxed_thresholds: the success thresholds of the paper's experiments: any force slices, and three quarters of
         the stains may remain. Only of the paper's activities.
       pool: start states of an activity; None: the task's own.
@@ -156,7 +162,9 @@ class EnvConfig:
     worlds: int = 1
     engine: str | None = None
     grasping: str | None = None
-    observations: str | Sequence[str] = VECTORS
+    observations: str | Sequence[str | Callable[..., Any]] = VECTORS
+    reward: Callable[..., Any] | None = None
+    terminated: Callable[..., Any] | None = None
     relaxed_thresholds: bool = False
     pool: Pool | None = None
     split: str = "train"

@@ -42,6 +42,7 @@ from ig2mj.process import entry_point
 from ig2mj.process.gc_pause import GC_PAUSED, compile_together
 from ig2mj.scene.scene import Scene
 from ig2mj.tasks.actions import ActionMap
+from ig2mj.tasks.custom.objective import CustomObjective
 from ig2mj.tasks.objective import Measures, Objective
 from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.batch import Batch, select_worlds
@@ -98,6 +99,7 @@ class Environment(StateCopies, StateImages, Configured):
         self.scene, self.core = scene, core
         self.num_worlds = core.engine.num_worlds
         self.objective = objective
+        self._own = objective if isinstance(objective, CustomObjective) else None
         self._goal = core.rules.goal
         self._map = action_map
         self._observer = observer
@@ -170,15 +172,22 @@ class Environment(StateCopies, StateImages, Configured):
 
         Raises:
           ActionError: the action has another shape, is not of numbers, or is NumPy's and has some that are not finite.
+          InputError: a reward of the user's is not finite (on the native engine).
         """
-        return self._step(checked_state(state), checked_action(self, action))
+        return self._sound(self._step(checked_state(state), checked_action(self, action)))
+
+    def _sound(self, state: EnvState) -> EnvState:
+        """The state after a step. Raises InputError: a reward of the user's is not finite, on the native engine."""
+        if self._own is not None and not self.pure and not np.isfinite(np.asarray(state.reward)).all():
+            self._own.refuse_nonfinite(state.info)
+        return state
 
     def step_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
         """`step`, neither checked nor compiled."""
         world = state.batch.world
         robots, bad = self._clean(action, world.key, world.step)
         batch, status = self.core.repeat_action_fn(state.batch, robots, self._substeps)
-        seen = self._evaluate(StepContext.of(batch), status, state.measures, bad)
+        seen = self._evaluate(StepContext.of(batch, action), status, state.measures, bad)
         return self._state(batch, seen, state.bad_actions + bad, state)
 
     def step_autoreset(self, state: EnvState, action: Array) -> EnvState:
@@ -188,7 +197,7 @@ class Environment(StateCopies, StateImages, Configured):
         by name. Reward, `terminated`, `truncated` and the rest of `info` are of the episode that ended. Do not change
         between this and `step` in a compiled loop: here `info` has one key more.
         """
-        return self._autoreset(checked_state(state), checked_action(self, action))
+        return self._sound(self._autoreset(checked_state(state), checked_action(self, action)))
 
     def step_autoreset_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
         """`step_autoreset`, neither checked nor compiled."""
@@ -316,15 +325,15 @@ class Environment(StateCopies, StateImages, Configured):
           status: of the task's goal. before: measures of the last step. bad: numbers of the action that were not
             finite.
         """
-        now = self.objective.measure(context.view, context.states, status, None, before)
+        now = self.objective.measure(context.view, context.states, status, None, before, context.action)
         sound = context.flags == 0
         terms = {
-            name: jnp.where(sound, jnp.nan_to_num(term), 0.0)
+            name: jnp.where(sound, term if self._own is not None else jnp.nan_to_num(term), 0.0)
             for name, term in self.objective.rewards(before, now).items()
         }
-        success, failure = self.objective.ended(now, status)
+        success, over = self.objective.ended(now, status)
         success, steps = success & sound, context.control_steps // self._substeps
-        terminated = success | (failure & sound)
+        terminated = over & sound
         truncated = ~terminated & (~sound | (steps >= self.task.horizon))
         info = {"success": success, "steps": steps, "bad_actions": bad, "flags": context.flags}
         return self._seen(context, status, now, terms, terminated, truncated, info)

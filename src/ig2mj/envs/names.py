@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from ig2mj.errors import InputError
-from ig2mj.tasks.registry import TASKS
+from ig2mj.tasks.registry import REGISTERED, TASKS, split_reference
 
 NAMESPACE, VERSION = "ig2mj", 0
 """Of the names that Gymnasium knows: ig2mj/CookingMeat-v0."""
@@ -15,33 +15,34 @@ NAMES = tuple(TASKS)
 
 _NAME = re.compile(rf"(?:{NAMESPACE}/)?(?P<name>[^/]+?)(?:-v(?P<version>\d+))?")
 
-_ACTIVITY = re.compile(rf"(?:{NAMESPACE}/)?activity/(?P<name>[^/]+?)(?:-v(?P<version>\d+))?")
+_ACTIVITY = re.compile(rf"(?:{NAMESPACE}/)?activity/(?P<name>[^/]+?|.+\.bddl)(?:-v(?P<version>\d+))?")
 
 
 def short_name(name: str) -> str | None:
     """ "CookingMeat" for CookingMeat, ig2mj/CookingMeat and ig2mj/CookingMeat-v0; None for unknown names."""
     match = _NAME.fullmatch(name)
-    if match is None or match["name"] not in NAMES or int(match["version"] or VERSION) != VERSION:
+    if match is None or int(match["version"] or VERSION) != VERSION:
         return None
-    return match["name"]
+    return match["name"] if match["name"] in NAMES or match["name"] in REGISTERED else None
 
 
 def activity_name(name: str) -> str | None:
-    """cleaning_windows of activity/cleaning_windows and ig2mj/activity/cleaning_windows-v0; None of other names."""
+    """cleaning_windows of activity/cleaning_windows and ig2mj/activity/cleaning_windows-v0, and the path of
+    activity/folder/mine.bddl; None of other names."""
     match = _ACTIVITY.fullmatch(name)
     return None if match is None or int(match["version"] or VERSION) != VERSION else match["name"]
 
 
 def refuse_path(name: str, file: object, element: str) -> None:
-    """Raises InputError where a file names its task by the path of a BDDL definition, which is of another file."""
-    if (activity_name(name) or name).endswith(".bddl"):
+    """Raises InputError where a file names its task by the path of a BDDL definition, or of code, of another file."""
+    if (activity_name(name) or name).endswith(".bddl") or split_reference(name) is not None:
         raise InputError(file, f"{name[:80]!r} is the path of a file, not the name of a task", element=element)
 
 
 def register(gymnasium: Any) -> None:
     """Registers all environments with Gymnasium (the module); may be called twice. Imports nothing."""
     face = "ig2mj.envs.gymnasium"
-    for name in NAMES:
+    for name in (*NAMES, *(own for own in REGISTERED if own.isidentifier())):
         full = f"{NAMESPACE}/{name}-v{VERSION}"
         if full not in gymnasium.registry:
             gymnasium.register(

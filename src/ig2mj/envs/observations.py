@@ -4,6 +4,7 @@
 |---|---|---|
 | `rgb`, `depth`, `scan`, ... | any sensor of `ig2mj.sensors.registry.SENSORS` (docs/guide/sensors.md) | the sensor's |
 | `privileged_state` | ground truth, in the frame of the robot's base (`Objective.vectors`) | [p] |
+| a function's name | what the function gives (`ig2mj.tasks.custom`) | [n] |
 | others of the task | such as iGibson's `task_obs` of navigation (`Objective.vectors`) | [n] |
 
 Every array begins with the world axis W.

@@ -3,16 +3,18 @@
     env = ig2mj.make("CookingMeat", robot="humanoid", worlds=4096)
     env = ig2mj.make("PointNavigation", {"worlds": 16, "sensors": {"scan_rays": 64}})
     env = ig2mj.make("activity/cleaning_up_after_a_meal", ig2mj.EnvConfig(robot="fetch"))
+    env = ig2mj.make("my_tasks.py:MugToTable", worlds=64)
 
-`CookingMeat`, `ig2mj/CookingMeat` and `ig2mj/CookingMeat-v0` are the same.
+`CookingMeat`, `ig2mj/CookingMeat` and `ig2mj/CookingMeat-v0` are the same. `my_tasks.py:MugToTable` imports the file,
+which runs its code (`ig2mj.CustomTask`).
 """
 
 from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Mapping
-from typing import Any, Unpack, overload
+from collections.abc import Mapping, Sequence
+from typing import Any, Unpack, cast, overload
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
@@ -24,17 +26,25 @@ from ig2mj.envs.config import VECTORS, EnvConfig, Overrides, default_of
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
 from ig2mj.envs.observations import Observer, check_names
-from ig2mj.envs.setups import Control, setup_activity, setup_bddl, setup_navigation
+from ig2mj.envs.setups import Control, EnvSetup, setup_activity, setup_bddl, setup_navigation
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
+from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.added_objects import object_texts, with_objects
-from ig2mj.tasks.bddl.task import BddlTask, bddl_task
+from ig2mj.tasks.bddl.task import PREFIX, BddlTask, bddl_task
+from ig2mj.tasks.custom.checks import checked_names
+from ig2mj.tasks.custom.code import TaskCode
+from ig2mj.tasks.custom.definition import Definition, task_of
+from ig2mj.tasks.custom.files import import_files, task_of_file
+from ig2mj.tasks.custom.objective import CustomObjective
 from ig2mj.tasks.homes import AnyTask, in_home
 from ig2mj.tasks.mixing import mixed_pool
 from ig2mj.tasks.navigation.task import NavigationTask
+from ig2mj.tasks.objective import Objective
+from ig2mj.tasks.pools import check_pool
+from ig2mj.tasks.registry import REGISTERED, load_task, split_reference
 from ig2mj.tasks.registry import TASKS as TASK_NAMES
-from ig2mj.tasks.registry import load_task
 from ig2mj.tasks.task import Task
 from ig2mj.tasks.variants import variant as task_variant
 from ig2mj.worlds.core import Core
@@ -46,28 +56,46 @@ TASKS: dict[str, Task | NavigationTask] = {name: load_task(name) for name in TAS
 
 
 def list_envs() -> list[str]:
-    """Names of all environments, as `make` takes them."""
-    return list(NAMES)
+    """Names of all environments, as `make` takes them, those of `ig2mj.register_task` last."""
+    import_files()
+    return [*NAMES, *REGISTERED]
+
+
+def is_environment(name: str) -> bool:
+    """Whether `make` takes a text for the name of an environment, without a look at what it names."""
+    import_files()
+    return short_name(name) is not None or activity_name(name) is not None or split_reference(name) is not None
 
 
 def find_task(name: str) -> AnyTask:
-    """The task of an environment's name: of `list_envs`, or "activity/" and one of BEHAVIOR-100's.
+    """The task of an environment's name: of `list_envs`, "activity/" and one of BEHAVIOR-100's, or "FILE.py:NAME".
 
     Raises:
-      UnknownNameError: with near matches. For activities also what `bddl_task` raises.
+      UnknownNameError: with near matches. For activities also what `bddl_task` raises. InputError: the file cannot be
+        imported, or its task is not sound.
     """
+    if split_reference(name) is not None:
+        return task_of_file(name)
+    import_files()
     activity = activity_name(name)
+    if activity is not None and (known := REGISTERED.get(f"{PREFIX}{activity}")) is not None:
+        return known.task
     if activity is not None:
         return bddl_task(activity)
     short = short_name(name)
     if short is None:
-        also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`)"
-        raise UnknownNameError("environment", name.removeprefix(f"{NAMESPACE}/"), NAMES, also=also)
-    return TASKS[short]
+        also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`), those of a file of yours FILE.py:NAME"
+        raise UnknownNameError("environment", name.removeprefix(f"{NAMESPACE}/"), list_envs(), also=also)
+    return REGISTERED[short].task if short in REGISTERED else TASKS[short]
+
+
+def task_named(name: str | Definition) -> AnyTask:
+    """The task of a name, or of what defines one. Raises as `find_task`."""
+    return find_task(name) if isinstance(name, str) else task_of(name)
 
 
 @entry_point
-def default_config(name: str | AnyTask) -> EnvConfig:
+def default_config(name: str | Definition) -> EnvConfig:
     """The settings that `make` uses for an environment where nothing else is asked for.
 
     Args:
@@ -76,12 +104,12 @@ def default_config(name: str | AnyTask) -> EnvConfig:
     Raises:
       UnknownNameError: no such environment, with near matches.
     """
-    return default_of(name if isinstance(name, AnyTask) else find_task(name))
+    return default_of(task_named(name))
 
 
 @overload
 def make(
-    name: str | AnyTask,
+    name: str | Definition,
     config: EnvConfig | Mapping[str, Any] | None = None,
     *,
     config_overrides: Mapping[str, Any] | None = None,
@@ -91,7 +119,7 @@ def make(
 
 @overload
 def make(
-    name: str | AnyTask,
+    name: str | Definition,
     config: str | TaskRobot | None,
     worlds: int = 1,
     engine: str | None = None,
@@ -104,7 +132,7 @@ def make(
 
 @entry_point
 def make(
-    name: str | AnyTask,
+    name: str | Definition,
     config: EnvConfig | Mapping[str, Any] | str | TaskRobot | None = None,
     worlds: int | None = None,
     engine: str | None = None,
@@ -116,7 +144,8 @@ def make(
     """Makes an environment.
 
     Args:
-      name: of a task (`list_envs`), "activity/" and the name of an activity of BEHAVIOR-100, or a task of your own.
+      name: of a task (`list_envs`), "activity/" and the name of an activity of BEHAVIOR-100, "FILE.py:NAME" for a task
+        of a file of yours, or the task itself: its class, function or object.
       config: all settings, or a mapping of those that differ from the task's (`default_config`). A name in this place
         is that of the robot: `make("CookingMeat", "fetch", 16, "native", "mitten")` is short for `robot`, `worlds`,
         `engine` and `grasping`.
@@ -131,7 +160,7 @@ def make(
     """
     given = {"worlds": worlds, "engine": engine, "grasping": grasping}
     overrides = {**{k: value for k, value in given.items() if value is not None}, **overrides}
-    task = name if isinstance(name, AnyTask) else find_task(name)
+    task = task_named(name)
     if isinstance(config, EnvConfig):
         chosen = config
     elif isinstance(config, Mapping | None):
@@ -145,7 +174,8 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     if config.home is not None:
         task = in_home(task, config.home)
     objects = object_texts(config.objects)
-    observations = (config.observations,) if isinstance(config.observations, str) else tuple(config.observations)
+    single = isinstance(config.observations, str) or callable(config.observations)
+    observations = cast("tuple[Any, ...]", (config.observations,) if single else tuple(config.observations))
     mode = task.grasping if config.grasping is None else config.grasping
     if mode not in MODES:
         raise UnknownNameError("grasping mode", mode, MODES)
@@ -156,6 +186,8 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     elif config.relaxed_thresholds:
         raise EngineError(f"relaxed_thresholds for {task.name}: only the paper's activities have them")
     task = with_objects(task, objects)
+    if isinstance(task, Task) and task.code is not None:
+        task = checked_names(task)
     if isinstance(task, NavigationTask) and config.pool is not None:
         raise EngineError(f"a pool for {task.name}: navigation draws its own start states")
     robot = next(iter(task.robots)) if config.robot is None else config.robot
@@ -168,34 +200,42 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         if (given := getattr(config, argument)) is not None:
             whole_number(argument, given)
     whole_number("augment_starts", config.augment_starts, least=0)
+    if config.pool is not None and isinstance(task, Task):
+        check_pool(task, config.pool)
     if config.augment_starts and not isinstance(task, Task):
         raise EngineError(f"augment_starts for {task.name}: only start states of the paper's activities are augmented")
     engine = choose_engine(config.engine)
     check_options(f"make with the {engine} engine", config.engine_options, engine, EnvConfig)
     task = dataclasses.replace(task, horizon=_horizon(task, config))
-    control = Control(config.whole_actions, config.period)
+    whole = config.whole_actions or (isinstance(task, Task) and task.whole_actions)
+    control = Control(whole, config.period)
     split, pool_size = config.split, config.pool_size
     if isinstance(task, NavigationTask):
         setup = setup_navigation(task, body, split, pool_size, control)
     elif isinstance(task, BddlTask):
         setup = setup_bddl(task, body, config.pool, split, pool_size, control)
     else:
-        setup = setup_activity(task, body, mode, config.pool, split, pool_size, config.relaxed_thresholds, control)
+        setup = setup_activity(
+            *(task, body, mode, config.pool, split, pool_size, config.relaxed_thresholds, control),
+            tried=lambda setup: _with_functions(setup, task, config, observations),
+        )
     scene, rules, controllers = setup.scene, setup.rules, setup.controllers
-    known = check_names(observations, setup.objective)
+    objective = _with_functions(setup, task, config, observations)
+    names = tuple(one if isinstance(one, str) else one.__name__ for one in observations)
+    known = check_names(names, objective)
     starts = setup.pool()  # may take minutes: everything that has a name is known by now
     rows = starts.size
     if config.augment_starts and isinstance(task, Task):
         starts = mixed_pool(task, scene, starts, config.augment_starts)
     physics = make_engine(engine, scene, config.worlds, **config.engine_options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
-    every_number = config.whole_actions or isinstance(task, BddlTask)  # of the action; some ask hands back
+    every_number = whole or isinstance(task, BddlTask)  # of the action; some ask hands back
     core = Core(physics, rules, starts, controllers, hands, hand_resets=every_number)
     settings = config.sensors
     if config.image_size is not None:
         settings = dataclasses.replace(settings, width=config.image_size, height=config.image_size)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], known, settings)
-    observer = Observer(observations, setup.objective, perceived)
+    observer = Observer(names, objective, perceived)
     resolved = dataclasses.replace(
         config,
         robot=robot,
@@ -204,6 +244,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         observations=observations,
         sensors=settings,
         image_size=None,
+        whole_actions=whole,
         # Of a BDDL activity fewer rows than asked for may be good, and its robot stands where the first row wants it.
         pool_size=pool_size if isinstance(task, BddlTask) else rows,
         home=None if config.home is None else task.home,
@@ -215,13 +256,39 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         scene,
         core,
         setup.actions,
-        setup.objective,
+        objective,
         observer,
         mode,
         setup.companions,
         config.period,
         resolved,
     )
+
+
+def _with_functions(setup: EnvSetup, task: AnyTask, config: EnvConfig, observations: Sequence[Any]) -> Objective:
+    """The objective of a task, with what it and the settings say in functions.
+
+    Raises:
+      EngineError: a setting is no function, or a function has no name of its own. InputError: see `CustomObjective`.
+    """
+    vectors = {}
+    for one in observations:
+        if isinstance(one, str):
+            continue
+        name = getattr(one, "__name__", "")
+        if not callable(one) or not name.isidentifier():
+            raise EngineError(f"observations: {one!r} is neither a name nor a function with a name (def, not lambda)")
+        if name in SENSORS or name in setup.objective.vectors or name in vectors:
+            raise EngineError(f"observations: '{name}' is the name of another observation: rename the function")
+        vectors[name] = one
+    functions = {"reward": config.reward, "terminated": config.terminated}
+    for name, function in functions.items():
+        if function is not None and not callable(function):
+            raise EngineError(f"{name} = {function!r}: a function of a TaskView is expected (ig2mj.CustomTask)")
+    code = (task.code or TaskCode(name=task.name)).with_functions(**functions, observations=vectors or None)
+    if not code.has_functions:
+        return setup.objective
+    return CustomObjective(setup.objective, code, setup.scene, setup.rules, setup.acting_hands, setup.actions.size)
 
 
 def _horizon(task: AnyTask, config: EnvConfig) -> int:

@@ -19,14 +19,16 @@ from ig2mj.tasks.actions import ActionMap, hand_actions, robot_actions, whole_ac
 from ig2mj.tasks.activity_objective import ActivityObjective
 from ig2mj.tasks.bddl.goal import conditions
 from ig2mj.tasks.bddl.objective import BddlObjective
-from ig2mj.tasks.bddl.task import BddlTask, activity_pool, standing_place
+from ig2mj.tasks.bddl.task import BddlTask, activity_pool
+from ig2mj.tasks.custom.code import blamed
 from ig2mj.tasks.homes import AnyTask, check_inside
 from ig2mj.tasks.navigation.companions import wanderers
 from ig2mj.tasks.navigation.objective import NavigationObjective
 from ig2mj.tasks.navigation.starts import make_starts
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.objective import Objective
-from ig2mj.tasks.pools import pool_of
+from ig2mj.tasks.pools import pool_of, start_states
+from ig2mj.tasks.standing import standing_place
 from ig2mj.tasks.task import Task, place_robot, role_of
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.rules import Rules
@@ -62,7 +64,8 @@ class EnvSetup:
     Attributes:
       scene: with its robots; the first is the one that acts. rules: with the task's goal, if it has one.
       pool: gives the start states, which may take minutes. controllers: of all robots. mittens: objects that mitten
-        grasping holds. companions: see `Environment`.
+        grasping holds. companions: see `Environment`. hands: numbers of the acting hands among all hands of the scene;
+        None: all of the first robot.
     """
 
     scene: Scene
@@ -73,6 +76,13 @@ class EnvSetup:
     actions: ActionMap
     mittens: tuple[str, ...] = ()
     companions: Companions | None = None
+    hands: tuple[int, ...] | None = None
+
+    @property
+    def acting_hands(self) -> tuple[int, ...]:
+        """Numbers of the acting hands among all hands of the scene."""
+        every = np.flatnonzero(self.scene.tables.hand_agent == 0)
+        return tuple(int(hand) for hand in every) if self.hands is None else self.hands
 
 
 def check_able(task: AnyTask, name: str, body: TaskRobot) -> None:
@@ -111,20 +121,56 @@ def setup_activity(
     count: int | None,
     relaxed_thresholds: bool,
     control: Control,
+    tried: Callable[[EnvSetup], object] = lambda setup: None,
 ) -> EnvSetup:
-    """Of an activity. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
+    """Of an activity.
+
+    Args:
+      count: rows of the pool. tried: called with a setup whose robot stands anywhere, before start states are sampled
+        to find where it stands. The others: of `ig2mj.make`.
+    """
+    name, body = find_robot(robot)
+    role = role_of(task, name, body)
+    if role.pos is None:
+        if pool is None and not start_states(task, split).rows_at_hand:
+            anywhere = dataclasses.replace(task, robots={name: dataclasses.replace(role, pos=(0.0, 0.0))})
+            tried(_placed_activity(anywhere, robot, grasping, lambda: pool_of(task), relaxed_thresholds, control))
+        rows = pool if pool is not None else pool_of(task, split, count)
+        x, y, yaw = standing_place(task.home, task.objects, task.objects_of_interest, rows)
+        task = dataclasses.replace(task, robots={name: dataclasses.replace(role, pos=(x, y), yaw=yaw)})
+
+    def starts() -> Pool:
+        return pool if pool is not None else pool_of(task, split, count)
+
+    setup = _placed_activity(task, robot, grasping, starts, relaxed_thresholds, control)
+    check_inside(task.name, setup.scene)
+    return setup
+
+
+def _placed_activity(
+    task: Task,
+    robot: str | TaskRobot,
+    grasping: str,
+    starts: Callable[[], Pool],
+    relaxed_thresholds: bool,
+    control: Control,
+) -> EnvSetup:
+    """Of an activity that says where its robot starts. Arguments as of `setup_activity`; `starts`: gives its pool."""
+    name = find_robot(robot)[0]
     task, body = place_robot(task, robot, drives=control.whole)
-    name, control = find_robot(robot)[0], control.of(body)
+    control = control.of(body)
     scene = load_scene(task.home, agents=[body], objects=task.objects)
-    check_inside(task.name, scene)
-    rules = rules_of(task, scene, relaxed_thresholds)
+    with blamed(task.code, "goal"):
+        rules = rules_of(task, scene, relaxed_thresholds)
     controller = control.controller(body, scene)
+    with blamed(task.code, "distances"):
+        objective = ActivityObjective(task, name, scene, rules.model)
     return EnvSetup(
         scene,
         rules,
-        lambda: pool if pool is not None else pool_of(task, split, count),
+        starts,
         (controller,),
-        ActivityObjective(task, name, scene, rules.model),
+        objective,
         control.actions(
             controller,
             lambda: hand_actions(
@@ -136,6 +182,7 @@ def setup_activity(
             ),
         ),
         task.objects_of_interest[:1],
+        hands=tuple(int(hand) for hand in objective.reward.hands),
     )
 
 
@@ -183,7 +230,8 @@ def setup_bddl(
     if isinstance(robot, str):
         check_able(task, name, body)
     rows = pool if pool is not None else activity_pool(task, split, count)
-    x, y = standing_place(task, rows)
+    named = tuple(dict.fromkeys(task.binding.objects.values()))
+    x, y, _ = standing_place(task.home, (*task.binding.additions, *task.added), named, rows)
     body = body.at(x, y, 0.0)
     scene = load_scene(task.home, agents=[body], objects=(*task.binding.additions, *task.added))
     rules = Rules.of_scene(scene)
@@ -203,4 +251,4 @@ def rules_of(task: Task, scene: Scene, relaxed_thresholds: bool = False) -> Rule
         stains = np.where(np.isfinite(p.stained_threshold), RELAXED_STAINS, p.stained_threshold)
         eased = dataclasses.replace(p, slice_force=force, stained_threshold=stains.astype(p.stained_threshold.dtype))
         rules = Rules(dataclasses.replace(rules.model, parameters=eased), initial=rules.initial)
-    return rules.with_goal(task.goal)
+    return rules.with_goal(task.goal or None)

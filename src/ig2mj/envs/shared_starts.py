@@ -42,7 +42,8 @@ def keep_pool(
 def start_states(task: str, split: str, count: int | None, objects: Sequence[str] = ()) -> str:
     """Digest of the start states that this machine would use; equal where homes and objects are equal."""
     found = with_objects(find_task(task), objects)
-    return f"{pools.start_states(found, split).cached.name} {count}" if isinstance(found, Task) else task
+    own = "" if found.code is None else f" {found.code.digest}"
+    return (f"{pools.start_states(found, split).cached.name} {count}" if isinstance(found, Task) else task) + own
 
 
 def shipped_states(task: str, grasping: str, split: str) -> str | None:

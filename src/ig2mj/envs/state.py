@@ -77,7 +77,7 @@ class StepContext:
 
     Attributes:
       view, states: of the worlds. controllers: states of the robots' controllers. flags: `guards.Flag` of each world.
-      control_steps: of the episode, so far.
+      control_steps: of the episode, so far. action: of the step; None at the start of episodes.
     """
 
     view: PhysicsView
@@ -85,12 +85,13 @@ class StepContext:
     controllers: tuple[Any, ...]
     flags: Int[Array, "W"]
     control_steps: Int[Array, "W"]
+    action: Float[Array, "W n"] | None = None
 
     @classmethod
-    def of(cls, batch: Batch) -> StepContext:
+    def of(cls, batch: Batch, action: Array | None = None) -> StepContext:
         """Of the worlds of a batch."""
         world = batch.world
-        return cls(world.view, world.states, batch.controllers, batch.flags, world.step)
+        return cls(world.view, world.states, batch.controllers, batch.flags, world.step, action)
 
 
 @struct.dataclass

@@ -26,6 +26,7 @@ from ig2mj.errors import InputError
 from ig2mj.files.content import read_json
 from ig2mj.files.heartbeat import Heartbeat, is_alive
 from ig2mj.files.unfinished import unfinished
+from ig2mj.tasks.custom.code import IN_FILES
 
 SIGN = ".alive"
 """In a checkpoint that is being written: the writer's sign of life."""
@@ -231,7 +232,12 @@ def refuse_difference(
     """Raises `error` for the first setting that differs, with both values."""
     as_read = json.loads(json.dumps(dict(wanted)))
     for name in [*as_read, *(n for n in found if n not in as_read)]:
+        if name in IN_FILES and name in as_read and name not in found:
+            continue  # of a BDDL definition, before version 0.2
         if found.get(name) != as_read.get(name):
+            if name == "task_code" and name in as_read:
+                problem = f"what determines {as_read.get('task')} in {as_read.get('task_file')} has changed since"
+                raise error(file, problem, fix="train again, or bring that version of the file back")
             raise error(
                 file, f"was made for {name} = {_short(found.get(name))}; you asked for {_short(as_read.get(name))}"
             )

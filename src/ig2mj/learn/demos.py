@@ -31,6 +31,7 @@ from ig2mj.files.npz import refuse_nonfinite
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.process import entry_point
+from ig2mj.tasks.custom.code import IN_FILES
 
 LONGEST = 100_000
 """Largest number of steps of a run that is read; more than any horizon."""
@@ -77,6 +78,7 @@ def _about(recording: Recording) -> tuple[dict[str, Any], dict[str, Space]]:
             problem = " ".join(str(e).split())
             raise InputError(recording.file, problem, element="attribute spaces", fix=_FIX) from e
     world = {name: recording.value(name, str) for name in ("task", "robot", "grasping")}
+    world |= {name: recording.value(name, str) for name in IN_FILES if name in recording.header}
     return {**world, "actions": recording.value("action_names", list), "privileged": privileged}, spaces
 
 

@@ -41,6 +41,7 @@ from ig2mj.process import entry_point
 from ig2mj.scene.changes import added
 from ig2mj.scene.found_again import entries_of, requests_again
 from ig2mj.tasks.added_objects import object_texts
+from ig2mj.tasks.custom.code import IN_FILES
 
 FORMAT_VERSION = 1
 
@@ -52,7 +53,8 @@ HIDDEN = ("hidden_mean", "hidden_deviation")
 
 def world_of(env: Any) -> dict[str, Any]:
     """What an environment is, apart from what is seen of it, for JSON; of tests' environments there is less to say."""
-    return {
+    code = getattr(getattr(env, "task", None), "code", None)
+    return ({} if code is None else code.in_files) | {
         "task": getattr(getattr(env, "task", None), "name", type(env).__name__),
         "robot": getattr(env, "robot", ""),
         "grasping": getattr(env, "grasping", ""),
@@ -87,6 +89,7 @@ def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, An
     sees_all = perception.actor_size == perception.vector_size
     seen = perception.vector_names if sees_all else perception.vector_names[:-1]
     found = {name: world[name] for name in ("task", "robot", "grasping", "actions")}
+    found |= {name: world[name] for name in IN_FILES if name in world}
     found["mode"] = perception.mode
     found["vector"] = {name: sizes[name] for name in seen}
     shape = perception.image_shape

@@ -36,6 +36,8 @@ class _Depends(msgspec.Struct):
     privileged: list[Name]
     rows: tuple[Count, Count] | None = None
     depth_range: Annotated[float, msgspec.Meta(gt=0, le=1e6)] | None = None
+    task_file: Name | None = None
+    task_code: Name | None = None
 
 
 class _Memory(msgspec.Struct):

@@ -31,6 +31,7 @@ from ig2mj.learn.log import Log
 from ig2mj.learn.progress import EPISODES, Window
 from ig2mj.learn.settings import old_names_work
 from ig2mj.process import entry_point
+from ig2mj.tasks.custom.code import shown
 
 
 @old_names_work
@@ -118,6 +119,8 @@ class _Training:
     ):
         settings = dataclasses.asdict(algorithm.config)
         self.run, self.team = run, team
+        code = getattr(getattr(env, "task", None), "code", None)
+        self.file = None if code is None else code.file
         self.depends = {**depends, "algorithm": algorithm.name, "settings": settings, "save_buffer": run.save_buffer}
         first_key, self.key = jax.random.split(jax.random.PRNGKey(run.seed))
         self.learner = algorithm.init(first_key) if learner is None else learner
@@ -193,6 +196,7 @@ class _Training:
                 if done < self.waiting:
                     simulator = min(took, simulator) if simulator == simulator else took
                 window.spent += spent if spent is not None else min(simulator, took)
+            _guard_rewards(sums, self.file)
             _guard(losses, self.checkpoints)
             window.add(sums)
             updates = losses.pop("updates")
@@ -239,6 +243,15 @@ class _Training:
         if self.run.stop_at_success is not None and window.solved(self.run.stop_at_success):
             return "solved"
         return "time" if clock >= self.run.minutes * 60 else None
+
+
+def _guard_rewards(sums: dict[str, float], file: str | None) -> None:
+    """Raises Ig2mjError where a term of the reward is not finite. `file`: of the task, where it is the user's."""
+    for name, value in sums.items():
+        if name.startswith("reward/") and not math.isfinite(value):
+            where = "" if file is None else f"{shown(file)}: "
+            term = name.removeprefix("reward/")
+            raise Ig2mjError(f"{where}training stopped: the reward's term '{term}' is {value}, and must be finite")
 
 
 def _guard(losses: dict[str, float], checkpoints: Checkpoints | None) -> None:

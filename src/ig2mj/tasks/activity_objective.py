@@ -29,10 +29,11 @@ class ActivityObjective:
     def __init__(self, task: Task, robot: str, scene: Scene, model: StateModel):
         """Raises UnknownNameError, AbilityError: the task does not fit the scene."""
         self.reward = Reward(task, robot, scene, model)
-        self._objects = np.array([scene.object_index(name) for name in task.objects_of_interest])
+        self._objects = np.array([scene.object_index(name) for name in task.objects_of_interest], int)
         self._ends = [locator(end, scene, model) for _, end in task.points(robot)]
         self.vectors = {"privileged_state": privileged_names(task, robot)}
-        self.outcomes = ("success_in_hand", *(("lifted_by_all",) if len(self.reward.hands) > 1 else ()))
+        lifts = len(self.reward.hands) > 1 and bool(task.objects_of_interest)
+        self.outcomes = ("success_in_hand", *(("lifted_by_all",) if lifts else ())) if len(self.reward.hands) else ()
 
     def measure(
         self,
@@ -41,6 +42,7 @@ class ActivityObjective:
         status: GoalStatus,
         row: Int[Array, "W"] | None,
         before: ActivityMeasures | None = None,
+        action: Float[Array, "W n"] | None = None,
     ) -> ActivityMeasures:
         return self.reward.measure(view, states, status, before)
 
@@ -50,7 +52,7 @@ class ActivityObjective:
     def ended(self, now: ActivityMeasures, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
         """Success ends an episode; there is no failure."""
         holds = jnp.asarray(status.holds)
-        return holds, jnp.zeros_like(holds)
+        return holds, holds
 
     def info(self, view: PhysicsView, now: ActivityMeasures, status: GoalStatus) -> dict[str, Array]:
         by_all, success = self.reward.holding(view).all(1), jnp.asarray(status.holds)

@@ -71,7 +71,7 @@ def mixed_pool(task: Task, scene: Scene, pool: Pool, count: int, seed: int = 0) 
     """
     said = [condition.strip("()").split() for condition in task.start]
     names = [words[1] for words in said]
-    if any(len(words) != 3 or words[0] != "on_top" or words[2] != said[0][2] for words in said):
+    if not said or any(len(words) != 3 or words[0] != "on_top" or words[2] != said[0][2] for words in said):
         raise EngineError(
             f"{task.name}: its start states cannot be augmented: its objects do not all lie on the same surface"
         )
@@ -110,7 +110,7 @@ def mixed_pool(task: Task, scene: Scene, pool: Pool, count: int, seed: int = 0) 
         if made >= count:
             coordinates = np.concatenate(found)[:count].reshape(count, -1)
             first = pool.rows(np.zeros(1, int))
-            return MixedPool(first.physics, first.states, pool.digest, coordinates, columns)
+            return MixedPool(first.physics, first.states, pool.digest, coordinates=coordinates, columns=columns)
     raise EngineError(f"{task.name}: {MOST_TRIES * count} tries gave only {made} of {count} augmented start states")
 
 

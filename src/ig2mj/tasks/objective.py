@@ -45,13 +45,14 @@ class Objective(Protocol):
         status: GoalStatus,
         row: Int[Array, "W"] | None,
         before: Measures | None = None,
+        action: Float[Array, "W n"] | None = None,
     ) -> Measures:
         """What is measured now.
 
         Args:
           status: of the task's goal; empty for a task without a goal expression.
           row: of the pool that the episodes begin with; None after steps. before: of the step before; None at the
-            start of episodes.
+            start of episodes. action: of the step; None likewise.
         """
         ...
 
@@ -60,7 +61,7 @@ class Objective(Protocol):
         ...
 
     def ended(self, now: Measures, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
-        """Whether the episode ends with success, and whether it ends with failure; never both."""
+        """Whether the task is done, and whether the episode ends, with success or failure."""
         ...
 
     def info(self, view: PhysicsView, now: Measures, status: GoalStatus) -> dict[str, Array]:

@@ -96,7 +96,7 @@ class StartStates:
             if found.size >= rows:
                 return _first(found, rows)
             if best is None or found.size > best.size:
-                best, tried = dataclasses.replace(found, digest=self.scene.digest), _tried(known)
+                best, tried = dataclasses.replace(found, digest=self.scene.digest, starts=None), _tried(known)
         pools = [] if best is None else [best]
         made = 0 if best is None else best.size
         for tried_so_far, new in sample(tried, rows - made):

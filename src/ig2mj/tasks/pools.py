@@ -9,12 +9,15 @@ from __future__ import annotations
 import collections
 import concurrent.futures
 import contextlib
+import hashlib
+import json
 import multiprocessing
 import os
 import pathlib
 import sys
 import threading
 from collections.abc import Callable, Generator, Iterator
+from pathlib import PurePath
 
 import jax
 import numpy as np
@@ -22,11 +25,14 @@ from jaxtyping import Bool
 
 from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.registry import make_engine
-from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.process import entry_point, use_processor_only
 from ig2mj.process.progress import progress as shown
 from ig2mj.sampling.many import sample
 from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.tasks.custom.code import NOTEBOOK
+from ig2mj.tasks.custom.code import shown as shown_file
+from ig2mj.tasks.custom.start import start_rows
 from ig2mj.tasks.pool_files import StartStates
 from ig2mj.tasks.task import Task
 from ig2mj.worlds.pool import Pool
@@ -91,6 +97,10 @@ def _hint(task: Task, split: str, count: int | None) -> str:
     from ig2mj.tasks.activities import ACTIVITIES
     from ig2mj.tasks.variants import variant, variants
 
+    if task.code is not None and task.code.file != NOTEBOOK:
+        options = [*(["--split", split] if split != "train" else []), *(["--count", str(count)] if count else [])]
+        words = " ".join(["ig2mj sample-task", f"{shown_file(task.code.file)}:{task.name}", *options])
+        return f" (on all processors: {words})"
     if task.name not in ACTIVITIES:
         return ""
     usual = ACTIVITIES[task.name]
@@ -112,18 +122,36 @@ def _made_of(task: Task) -> list[object]:
     """What of a task a pool depends on."""
     near = [[n.object, *n.pos, n.least, n.most] for n in task.near]
     upright = [task.upright] if task.upright else []
-    return [task.objects, task.start, near, task.flat, *upright]
+    code = task.code
+    own = [] if code is None or code.start is None else [["start", code.digest]]
+    return [task.objects, task.start, near, task.flat, *upright, *own]
+
+
+def starts_digest(task: Task) -> str:
+    """Hash of what determines the start states of a task in the household that it names."""
+    objects = [PurePath(name).name if PurePath(name).is_absolute() else name for name in task.objects]
+    text = json.dumps([VERSION, objects, *_made_of(task)[1:]], default=str)
+    return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
+
+
+def check_pool(task: Task, pool: Pool) -> None:
+    """Raises InputError: the pool is of another version of a task in a user's code."""
+    if task.code is not None and pool.starts is not None and pool.starts != starts_digest(task):
+        problem = "what determines the start states has changed since the pool was made"
+        fix = f"ig2mj sample-task {shown_file(task.code.file)}:{task.name} makes another"
+        raise InputError(shown_file(task.code.file), problem, element=task.name, fix=fix)
 
 
 def start_states(task: Task, split: str = "train", scene: Scene | None = None) -> StartStates:
     """Where the pool's rows are kept, and what they are made of. Raises UnknownNameError: no such split."""
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
+    own = {} if task.code is None else {**task.code.in_files, "starts": starts_digest(task)}
     return StartStates(
         f"{task.name}-{split}",
         bare_scene(task) if scene is None else scene,
         lambda digest: [VERSION, digest, *_made_of(task)],
-        {"task": task.name, "split": split, "conditions": list(task.start)},
+        {"task": task.name, "split": split, "conditions": list(task.start), **own},
     )
 
 
@@ -229,7 +257,10 @@ def _batches(
 def _batch(task: Task, scene: Scene | None, seed: int, first: int, count: int) -> Pool | None:
     """Of these rows of a seed those in which every object is where the task wants it."""
     scene = bare_scene(task) if scene is None else scene
-    drawn = sample(scene, task.start, count, seed, first=first).pool
+    if task.code is not None and task.code.start is not None:
+        drawn = start_rows(task.code, scene, seed, first, count)
+    else:
+        drawn = sample(scene, task.start, count, seed, first=first).pool
     if drawn is None:
         return None
     good = np.flatnonzero(_near(task, scene, drawn))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import pkgutil
+import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ig2mj.tasks.custom.definition import RegisteredTask
     from ig2mj.tasks.navigation.task import NavigationTask
     from ig2mj.tasks.task import Task
 
@@ -23,6 +25,20 @@ TASKS: dict[str, str] = {
     "RoomRearrangement": "ig2mj.tasks.navigation.task:ROOM_REARRANGEMENT",
 }
 """Where each is defined ("module:name"), in the order of `ig2mj.list_envs`."""
+
+
+REGISTERED: dict[str, RegisteredTask] = {}
+"""Tasks of this process that `ig2mj.register_task` has made known, by name."""
+
+_REFERENCE = re.compile(r"(?P<file>.+\.py):(?P<name>[^:/\\]*)", re.DOTALL)
+
+
+def split_reference(name: str) -> tuple[str, str] | None:
+    """File and name of "my_tasks.py:MugToTable", the name '' of "my_tasks.py"; None of other names."""
+    if name.endswith(".py"):
+        return name, ""
+    match = _REFERENCE.fullmatch(name)
+    return None if match is None else (match["file"], match["name"])
 
 
 def load_task(name: str) -> Task | NavigationTask:

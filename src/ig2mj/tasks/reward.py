@@ -72,7 +72,8 @@ class Reward:
         self._locate = [(locator(a, scene, model), locator(b, scene, model)) for a, b in task.points(robot)]
         own = np.flatnonzero(scene.tables.hand_agent == 0)
         self.hands = own[np.array(acts.hands, int)]
-        self._first = scene.object_index(task.objects_of_interest[0])
+        first = task.objects_of_interest[:1]
+        self._first = scene.object_index(first[0]) if first else None
         self._ground = np.flatnonzero(np.isin(np.array(scene.tables.object_categories), GROUND))
         self._stain_row = None if task.stains_of is None else STAIN.row_of(model, scene.object_index(task.stains_of))
 
@@ -95,8 +96,10 @@ class Reward:
         if self._stain_row is not None:
             stains = jnp.asarray(states.stain.alive)[:, self._stain_row].sum(-1).astype(jnp.float32)
         held = self.holding(view)
-        lift = None if len(self.hands) < 2 else self._lift(view, held, None if before is None else before.lift)
-        return ActivityMeasures(share * count, jnp.stack(distances, axis=-1), jnp.any(held, axis=1), stains, lift)
+        two = len(self.hands) > 1 and self._first is not None
+        lift = self._lift(view, held, None if before is None else before.lift) if two else None
+        apart = jnp.stack(distances, axis=-1) if distances else jnp.zeros((share.shape[0], 0), jnp.float32)
+        return ActivityMeasures(share * count, apart, jnp.any(held, axis=1), stains, lift)
 
     def _lift(self, view: PhysicsView, held: Bool[Array, "W H"], before: Lift | None) -> Lift:
         """How the first object left the floor; `before` is of the step before, None at the start of episodes."""
@@ -109,6 +112,8 @@ class Reward:
 
     def holding(self, view: PhysicsView) -> Bool[Array, "W H"]:
         """Which acting hands hold the first object."""
+        if self._first is None:
+            return jnp.zeros((view.held.shape[0], len(self.hands)), bool)
         return jnp.asarray(view.held)[:, self.hands, self._first]
 
     def terms(self, before: ActivityMeasures, now: ActivityMeasures) -> dict[str, Float[Array, "W"]]:
@@ -124,7 +129,7 @@ class Reward:
     def _approach(self, before: ActivityMeasures, now: ActivityMeasures) -> Float[Array, "W"]:
         """How much the distance that counts has grown, m."""
         change = now.distances - before.distances
-        if not self._weights.staged:
+        if not self._weights.staged or not change.shape[1]:
             return change.sum(-1)
         later = change[:, 1] if change.shape[1] > 1 else jnp.zeros_like(change[:, 0])
         same = now.held == before.held  # at the change of the stage the two distances have nothing in common

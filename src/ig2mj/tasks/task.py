@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 from ig2mj.agents.registry import find_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.tasks.custom.code import TaskCode
 from ig2mj.tasks.points import Hand, Point
 
 HORIZON = 200
@@ -53,14 +54,15 @@ class Acts:
     """One robot in a task.
 
     Attributes:
-      pos: where it starts, m. For the humanoid the middle of its body, 0.55 m above the floor.
+      pos: where it starts, m. For the humanoid the middle of its body, 0.55 m above the floor. Without a height it
+        stands on the floor; None: on free floor near the objects of interest, which it faces (`ig2mj.tasks.standing`).
       yaw: degrees it is turned about the vertical; at 0 it faces x.
       camera_tilt, camera_pan: rad, downwards and to the left, of Fetch's camera; None: the robot's own.
       hands: numbers of the hands that act; the rest of the robot stays where it is.
       weights: of the reward.
     """
 
-    pos: Vector3
+    pos: Vector3 | tuple[float, float] | None
     yaw: float = 0.0
     camera_tilt: float | None = dataclasses.field(default=None, repr=False)  # part of the model's hash
     camera_pan: float = dataclasses.field(default=0.0, repr=False)  # as well
@@ -74,6 +76,7 @@ class TaskLike(Protocol):
 
     Attributes:
       name: as `ig2mj.make` takes it. summary: one sentence. home: a shipped home. horizon: agent steps of an episode.
+        code: what it says in functions of its author's; None: nothing.
       robots: names of those that it is made for, the usual one first. Others of the registry take part if they have
         what it takes. grasping: how hands hold unless something else is asked for.
     """
@@ -97,6 +100,9 @@ class TaskLike(Protocol):
 
     @property
     def grasping(self) -> str: ...
+
+    @property
+    def code(self) -> TaskCode | None: ...
 
 
 @dataclasses.dataclass(frozen=True)
@@ -141,6 +147,8 @@ class Task:
       robots: name of each robot that it is made for, and how it takes part (others: `place_robot`).
       horizon: agent steps until an episode is truncated. grasping: mode unless another is asked for.
       physical: what is different with "physical" grasping; None: nothing.
+      whole_actions: an action has every number of the robot's controller unless something else is asked for.
+      code: what the task says in functions of its author's; None: nothing.
       expert: from a `tasks.experts.sight.ExpertView` to a list of one `tasks.experts.motion.HandMotion` for each acting
         hand: what it should do now. Pure and batched. None: the task has no scripted expert.
     """
@@ -163,6 +171,8 @@ class Task:
     # Not in the text that recordings know a task by: where it applies, it shows in `objects` and `near`.
     physical: Physical | None = dataclasses.field(default=None, repr=False)
     expert: Callable[..., Any] | None = dataclasses.field(default=None, repr=False)
+    whole_actions: bool = dataclasses.field(default=False, repr=False)
+    code: TaskCode | None = dataclasses.field(default=None, repr=False)
     depth_range: ClassVar[float] = 3.0
     """m from the camera within which everything lies that matters: an arm's reach and the furniture around it."""
 
@@ -199,15 +209,18 @@ def role_of(task: Task, robot: str, body: TaskRobot) -> Acts:
     """
     if robot in task.robots and not body.own_actions:  # a robot from a URDF may have the name of another
         return task.robots[robot]
-    role = min(task.robots.values(), key=lambda listed: listed.pos[2])
+    role = min(task.robots.values(), key=lambda listed: listed.pos[2] if listed.pos and len(listed.pos) == 3 else 0.0)
     hands = tuple(range(len(role.hands)))
+    if task.whole_actions:
+        hands = hands[: body.hand_count]
     if body.hand_count < len(hands):
         count = f"{body.hand_count or 'no'} hand{'s' * (body.hand_count > 1)}"
         raise EngineError(
             f"robot '{robot}' has {count}: it cannot do {task.name}, which takes {len(hands)} "
             f"({', '.join(task.robots)} can)"
         )
-    return dataclasses.replace(role, pos=(*role.pos[:2], body.stands), hands=hands)
+    pos = None if role.pos is None else (*role.pos[:2], body.stands)
+    return dataclasses.replace(role, pos=pos, hands=hands)
 
 
 def place_robot(task: Task, robot: str | TaskRobot, *, drives: bool = False) -> tuple[Task, TaskRobot]:
@@ -224,4 +237,7 @@ def place_robot(task: Task, robot: str | TaskRobot, *, drives: bool = False) -> 
     role = role_of(task, name, body)
     body = body.for_activity(drives=drives, camera_tilt=role.camera_tilt, camera_pan=role.camera_pan)
     task = dataclasses.replace(task, robots={**task.robots, name: role})
-    return task, body.at(*role.pos[:2], math.radians(role.yaw), role.pos[2])
+    if role.pos is None:
+        raise EngineError(f"{task.name} says nothing of where robot '{name}' starts: ig2mj.make finds a position")
+    height = role.pos[2] if len(role.pos) == 3 else None
+    return task, body.at(*role.pos[:2], math.radians(role.yaw), height)

@@ -28,7 +28,8 @@ MOST = 3
 
 def variants(task: Task) -> int:
     """How many variants a task has, its own objects included: as many as there are models of each category."""
-    return min((MOST, *(len(library().get(category, ())) for category in _categories(task))))
+    categories = _categories(task)
+    return min((MOST, *(len(library().get(category, ())) for category in categories))) if categories else 1
 
 
 def variant(task: Task, number: int, grasping: str = "mitten") -> Task:
@@ -65,7 +66,7 @@ def variant(task: Task, number: int, grasping: str = "mitten") -> Task:
 def _categories(task: Task) -> list[str]:
     """Of the objects that vary."""
     loose = [name for name in task.objects if "@" not in name]
-    return loose or [task.objects_of_interest[0].rsplit("_", 1)[0]]
+    return loose or [name.rsplit("_", 1)[0] for name in task.objects_of_interest[:1]]
 
 
 def _renamed(value: Any, old: str, new: str) -> Any:

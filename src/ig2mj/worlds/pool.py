@@ -45,11 +45,13 @@ class Pool:
 
     Attributes:
       digest: of the scene that it belongs to (`Scene.owns` knows it), where that is known.
+      starts: hash of what determines its rows, of a task in a user's code (`ig2mj.tasks.pools.starts_digest`).
     """
 
     physics: Snapshot
     states: ExtendedStates
     digest: str | None = struct.field(pytree_node=False, default=None)
+    starts: str | None = struct.field(pytree_node=False, default=None)
 
     def __repr__(self) -> str:
         return counted(self, rows=length(self.physics.time))
@@ -142,7 +144,7 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
     if not pool.size:
         raise InputError(file, "has no rows", fix=fix)
     check_values(pool.physics, pool.states, file)
-    return dataclasses.replace(pool, digest=header.get("digest"))
+    return dataclasses.replace(pool, digest=header.get("digest"), starts=header.get("starts"))
 
 
 def check_values(physics: Snapshot, states: ExtendedStates, file: str | os.PathLike) -> None:
@@ -199,5 +201,6 @@ class _Header(msgspec.Struct):
 
     scene: str
     digest: str | None = None
+    starts: str | None = None
     additions: list[AdditionEntry] = []
     changes: list[str] = []

@@ -52,6 +52,7 @@ class BddlObjective:
         status: GoalStatus,
         row: Int[Array, "W"] | None,
         before: Progress | None = None,
+        action: Float[Array, "W n"] | None = None,
     ) -> Progress:
         return Progress(jnp.asarray(status.fraction, jnp.float32))
 
@@ -62,7 +63,7 @@ class BddlObjective:
     def ended(self, now: Progress, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
         """Success ends an episode; there is no failure."""
         holds = jnp.asarray(status.holds)
-        return holds, jnp.zeros_like(holds)
+        return holds, holds
 
     def info(self, view: PhysicsView, now: Progress, status: GoalStatus) -> dict[str, Array]:
         return {"goal_progress": now.share}

@@ -10,26 +10,30 @@ from __future__ import annotations
 
 import collections
 import dataclasses
+import hashlib
 import sys
 from collections.abc import Iterator
 
 import numpy as np
 
-from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.files.content import read_text
 from ig2mj.process.progress import progress
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder, shipped_homes
-from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.scene.scene import Scene
 from ig2mj.tasks.bddl.binding import Binding, BindingError
 from ig2mj.tasks.bddl.definitions import load_activity
 from ig2mj.tasks.bddl.start import fitting, load_bound, sample_start, start_conditions
-from ig2mj.tasks.navigation.starts import Places
+from ig2mj.tasks.custom.code import TaskCode
 from ig2mj.tasks.pool_files import StartStates
 from ig2mj.tasks.pools import SEEDS, VERSION
 from ig2mj.worlds.pool import Pool
 
 PREFIX = "activity/"
+
+DEFINITION = ".bddl"
+"""Ending of a file with a definition."""
 
 HORIZON = 1000
 """Agent steps: 100 s."""
@@ -40,9 +44,6 @@ ROWS = 16
 TRIES = 2
 """Candidates for each start state that is asked for, after which a pool has fewer."""
 
-CLEARANCE = 0.45
-"""m around the robot that are free of furniture."""
-
 
 @dataclasses.dataclass(frozen=True)
 class BddlTask:
@@ -50,7 +51,7 @@ class BddlTask:
 
     Attributes:
       name: "activity/" and the activity's name. summary: one sentence. binding: which objects of the home play it.
-      robots: names of those that can do it. horizon, grasping: as of `ig2mj.tasks.task.Task`.
+      robots: names of those that can do it. horizon, grasping, code: as of `ig2mj.tasks.task.Task`.
       added: further objects in the home (`ig2mj.tasks.added_objects`).
     """
 
@@ -61,6 +62,7 @@ class BddlTask:
     horizon: int = HORIZON
     grasping: str = "assisted"
     added: tuple[str, ...] = ()
+    code: TaskCode | None = dataclasses.field(default=None, repr=False)
 
     @property
     def home(self) -> str:
@@ -85,7 +87,16 @@ def bddl_task(name: str) -> BddlTask:
         home, reasons = min(errors.items(), key=lambda item: len(item[1]))
         raise BindingError(activity.name, home, reasons)
     words = activity.name.replace("_", " ")
-    return BddlTask(PREFIX + activity.name, f"{words[0].upper()}{words[1:]}.", bound[0])
+    summary, code = f"{words[0].upper()}{words[1:]}.", _code(short, activity.name)
+    return BddlTask(PREFIX + activity.name, summary, bound[0], code=code)
+
+
+def _code(file: str, name: str) -> TaskCode | None:
+    """Of a definition of the user's; None of one that ships."""
+    if not file.endswith(DEFINITION):
+        return None
+    text = read_text(file, fix="name a BDDL definition")
+    return TaskCode(file, PREFIX + name, hashlib.blake2b(text.encode(), digest_size=16).hexdigest())
 
 
 def activity_pool(task: BddlTask, split: str = "train", count: int | None = None) -> Pool:
@@ -135,27 +146,3 @@ def activity_states(task: BddlTask, split: str = "train") -> StartStates:
     return StartStates(
         f"{short}-{split}", bare, lambda digest: [VERSION, digest, conditions], {"task": task.name, "split": split}
     )
-
-
-def standing_place(task: BddlTask, pool: Pool) -> tuple[float, float]:
-    """World x and y (m): free floor with room to turn, near the activity's objects in the pool's first row.
-
-    Raises:
-      EngineError: the home has no map, or no such floor.
-    """
-    import scipy.ndimage
-
-    probe = load_scene(task.home, agents=[TurtleBot()], objects=(*task.binding.additions, *task.added))
-    own = probe.start_data().qpos.copy()
-    row = np.asarray(pool.physics.scene.qpos)[0]
-    own[: len(row)] = row
-    places = Places(probe, own)
-    floor = places.floor()
-    padded = np.pad(floor.free, 1)
-    away = np.asarray(scipy.ndimage.distance_transform_edt(padded))[1:-1, 1:-1] * floor.resolution
-    cells = np.argwhere(away >= min(CLEARANCE, away.max()))
-    spots = floor.centres(cells)
-    centres = places.object_positions(task.objects_in(probe))[:, :2]
-    apart = np.linalg.norm(spots[:, None] - centres[None], axis=-1)
-    x, y = spots[int(np.argmin(np.median(apart, axis=1)))]
-    return float(x), float(y)

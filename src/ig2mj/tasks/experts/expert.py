@@ -68,16 +68,16 @@ class Expert:
         """
         base = jnp.asarray(view.agent.base_quat)[:, 0]
         see = ExpertView(
-            view,
-            states,
-            self._scene,
-            self._model,
-            self._controls,
-            self.task.objects_of_interest,
-            self._hands,
-            self._grips,
-            self.grasping,
-            {name: _of_the_world(base, belief) for name, belief in (beliefs or {}).items()},
+            view=view,
+            states=states,
+            scene=self._scene,
+            model=self._model,
+            hands=self._hands,
+            controls=self._controls,
+            objects=self.task.objects_of_interest,
+            grips=self._grips,
+            grasping=self.grasping,
+            beliefs={name: _of_the_world(base, belief) for name, belief in (beliefs or {}).items()},
         )
         return jnp.concatenate(
             [self._action(base, motion, hand) for motion, hand in zip(self._plan(see), self._controls, strict=True)],

@@ -105,6 +105,7 @@ class NavigationObjective:
         status: GoalStatus,
         row: Int[Array, "W"] | None,
         before: NavigationMeasures | None = None,
+        action: Float[Array, "W n"] | None = None,
     ) -> NavigationMeasures:
         row = jnp.asarray(row if before is None else before.row)
         base = jnp.asarray(view.agent.base_pos)[:, 0]
@@ -152,7 +153,7 @@ class NavigationObjective:
         """Success at the goal; failure after too many collisions, or below the floor. Closing furniture has no
         success: its episodes go on, so that what was closed must stay closed."""
         success = now.reached if self._task.goal != "close" else jnp.zeros_like(now.reached)
-        return success, ~success & (now.fallen | (now.collisions > self._task.max_collisions))
+        return success, success | now.fallen | (now.collisions > self._task.max_collisions)
 
     def info(self, view: PhysicsView, now: NavigationMeasures, status: GoalStatus) -> dict[str, Array]:
         """ "spl": success weighted by the length of the way (Anderson et al. 2018), for tasks of going to a point."""

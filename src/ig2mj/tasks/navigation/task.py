@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import dataclasses
 
+from ig2mj.tasks.custom.code import TaskCode
+
 
 @dataclasses.dataclass(frozen=True)
 class NavigationTask:
@@ -31,6 +33,7 @@ class NavigationTask:
       max_collisions: agent steps with a collision after which an episode fails.
       fall: m below its start at which the robot has fallen off.
       horizon: agent steps until an episode is truncated. grasping: mode unless another is asked for.
+      code: what the task says in functions of its author's; None: nothing.
     """
 
     name: str
@@ -55,6 +58,7 @@ class NavigationTask:
     fall: float = 0.03
     horizon: int = 500
     grasping: str = "physical"
+    code: TaskCode | None = dataclasses.field(default=None, repr=False)
 
 
 _LOOSE = ("canned_food", "cracker_box", "sugar_jar", "soup", "mayonnaise")

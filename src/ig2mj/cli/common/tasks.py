@@ -1,0 +1,36 @@
+"""Tasks in files of the user's: the option `--task` of commands that read a recording or a policy.
+
+It takes FILE.py:NAME, or activity/FILE.bddl.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import tyro
+
+TaskOption = Annotated[str | None, tyro.conf.arg(metavar="FILE.py:NAME")]
+
+
+def use_task(reference: str | None) -> None:
+    """Imports the file of a task, so that recordings and policies of the task find it; None: nothing is asked for.
+
+    Raises:
+      Ig2mjError: it is neither of these. InputError: the file cannot be imported. UnknownNameError: no such task in it.
+    """
+    if reference is not None:
+        from ig2mj.tasks.custom.files import use_task as use
+
+        use(reference)
+
+
+def task_option(name: str) -> str:
+    """What a command that reads a file of a task needs besides: " --task FILE.py:NAME", or '' for one that ships.
+
+    Args:
+      name: of the task, as it was given.
+    """
+    from ig2mj.tasks.registry import split_reference
+
+    own = split_reference(name) is not None or name.endswith(".bddl")
+    return f" --task {name}" if own else ""
