@@ -15,10 +15,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.agents.base import Controller
+from ig2mj.agents.humanoid.frames import HAND_REACH, SHOULDER_POS
 from ig2mj.agents.task_robot import HandControl, TaskRobot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import (
     length,
+    matrix_to_quat,
     quat_conjugate,
     quat_multiply,
     quat_rotate,
@@ -155,7 +157,12 @@ class WheeledBody(_Body):
 
 
 class HoveringBody(_Body):
-    """The humanoid: a body that moves in any direction, and hands whose targets are displaced in its frame."""
+    """The humanoid: a body that moves in any direction, and hands whose targets are displaced in its frame.
+
+    Attributes:
+      reach: m from a shoulder that a hand goes. shoulders, carry: [H, 3] m, in the body's frame: of the shoulders, and
+        where hands carry things.
+    """
 
     sideways = True
 
@@ -163,6 +170,8 @@ class HoveringBody(_Body):
         super().__init__(scene, controller, agent)
         robot = scene.agents[agent]
         self._stands = float(robot.stands) if isinstance(robot, TaskRobot) else 0.0
+        self.reach, self.shoulders = HAND_REACH - SPARE_REACH, np.array(SHOULDER_POS)
+        self.carry = np.array([[CARRY[0], side * CARRY[1], CARRY[2]] for side in (1, -1)])
 
     def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
         action = np.tile(self._rest, (len(senses.base_pos), 1))
@@ -199,6 +208,13 @@ class HoveringBody(_Body):
         own = [np.asarray(quat_rotate_inverse(senses.base_quat, v.astype(np.float32))) for v in (move, turn)]
         return np.concatenate(own, axis=1)
 
+    def turned(self, hand: int, fingers: Sequence[float], palm: Sequence[float]) -> tuple[float, float, float, float]:
+        """Orientation of a hand whose fingers point, and whose palm faces, along directions at right angles."""
+        z, y = np.asarray(palm, float), np.asarray(fingers, float) * (1.0 if hand == 0 else -1.0)
+        matrix = np.stack([np.cross(y, z), y, z], axis=-1)
+        w, x, y_, z_ = np.asarray(matrix_to_quat(matrix), float)
+        return (float(w), float(x), float(y_), float(z_))
+
     def _hand(
         self, senses: Senses, rows: Rows, number: int
     ) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"]]:
@@ -213,6 +229,9 @@ class HoveringBody(_Body):
         turn *= np.minimum(1.0, HAND_TURN_STEP / np.maximum(np.asarray(length(turn)), 1e-6))[:, None]
         return move, turn
 
+
+SPARE_REACH, CARRY = 0.08, (0.42, 0.16, 0.2)
+"""m that are left of an arm's reach; forwards, to the side and up: where a hand carries what it holds."""
 
 SPEED_OF_BASE = 0.05
 """m in an agent step of a base that moves together with a hand."""

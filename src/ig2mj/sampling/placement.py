@@ -205,7 +205,7 @@ class Placer:
     def _try_area(self, task: _Task, quat: np.ndarray, shape: Footprint, area: PlacementArea, support: str) -> bool:
         if not task.budget.spend():
             return False
-        rest = self._candidates(task, shape, area, support)
+        rest = self._candidates(task.object_index, task.rng, task.rejected, shape, area, support)
         order = task.rng.permutation(len(rest.row))
         if support == "loose":  # deep down, it is more likely to stay
             spread = task.rng.uniform(0.0, LOOSE_SPREAD, len(order))
@@ -221,12 +221,41 @@ class Placer:
             self.query.load(task.before)
         return False
 
-    def _candidates(self, task: _Task, shape: Footprint, area: PlacementArea, support: str) -> Rest:
+    def spots(
+        self,
+        object_index: int,
+        areas: Areas,
+        quat: Float[np.ndarray, "4"],
+        rng: np.random.Generator,
+        support: str = "full",
+        most: int = AREAS,
+    ) -> Iterator[Float[np.ndarray, "3"]]:
+        """Positions of an object's main body in a given orientation (world frame, w-x-y-z) at which it rests in the
+        areas of a rule when it is lowered; nothing is moved, and no physics is run.
+
+        Args:
+          support: one of `SUPPORT`. most: areas that are looked at.
+        """
+        shape = self.query.footprint(object_index, quat, rng.uniform(-CELL / 2, CELL / 2, 2))
+        for area in itertools.islice(areas(shape, rng), most):
+            rest = self._candidates(object_index, rng, collections.Counter(), shape, area, support)
+            for n in rng.permutation(len(rest.row)):
+                yield origin(shape, int(rest.row[n]), int(rest.col[n]), float(rest.height[n]))
+
+    def _candidates(
+        self,
+        object_index: int,
+        rng: np.random.Generator,
+        rejected: Rejections,
+        shape: Footprint,
+        area: PlacementArea,
+        support: str,
+    ) -> Rest:
         """Candidates that pass the tests on columns; first of a few cells drawn at random, else of many."""
         cells = ColumnWindow.around(area.low, area.high)
         rows, cols = shape.underside.shape
         window = ColumnWindow(cells.row + shape.row, cells.col + shape.col, cells.rows + rows, cells.cols + cols)
-        level = self.query.level(window, area.height, without=(task.object_index,))
+        level = self.query.level(window, area.height, without=(object_index,))
         every = np.arange(cells.rows * cells.cols)
         if area.allowed is not None:
             every = every[area.allowed(cells.row + every // cells.cols, cells.col + every % cells.cols)]
@@ -236,14 +265,14 @@ class Placer:
         rest, good = _none(), np.zeros(0, bool)
         for first in (True, False):
             if first and not few:
-                chosen = task.rng.choice(every, RANDOM_CELLS, replace=False)
+                chosen = rng.choice(every, RANDOM_CELLS, replace=False)
             else:
                 chosen = every
                 if len(chosen) > many:
                     possible = possible_origins(level, shape, area.supports, cells.rows, cells.cols, wanted == "full")
                     chosen = chosen[possible.ravel()[chosen]]
                 if len(chosen) > many:
-                    chosen = task.rng.choice(chosen, many, replace=False)
+                    chosen = rng.choice(chosen, many, replace=False)
             row, col = cells.row + chosen // cells.cols, cells.col + chosen % cells.cols
             rest = rest_at(level, shape, row, col, area.supports, wanted)
             good = {"full": rest.full, "balanced": rest.balanced, "loose": rest.clear}[wanted]
@@ -251,11 +280,11 @@ class Placer:
                 break
         if not good.any():
             if not len(every) or not np.isin(level.owner, area.supports).any():
-                task.rejected["no surface"] += 1
+                rejected["no surface"] += 1
             elif not rest.clear.any():
-                task.rejected["no room"] += 1
+                rejected["no room"] += 1
             else:
-                task.rejected["not supported"] += 1
+                rejected["not supported"] += 1
         return Rest(*(getattr(rest, f.name)[good] for f in dataclasses.fields(Rest)))
 
     def _let_go(self, task: _Task, pos: np.ndarray, quat: np.ndarray, area: PlacementArea, support: str) -> str:

@@ -1,0 +1,144 @@
+"""How far points are from the collision pieces of a household, and straight ways of a hand between them.
+
+A hand is some spheres, and what it holds some points. The distance to a convex piece is that to the farthest of its
+planes, which is exact in front of a face and too small in front of an edge: a way that is found is free.
+
+Axes: K pieces, N planes, M points.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.view import PhysicsView
+from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.scene.scene import Scene
+from ig2mj.scene.tables import PieceKind, SceneTables
+
+FAR = 0.3
+"""m from a point beyond which pieces are not looked at: the distance is then this at least."""
+
+STEP = 0.03
+"""m between the points of a way at which it is checked."""
+
+LIFTS = (0.1, 0.25, 0.45)
+"""m above start and goal at which a hand goes across where the straight way is blocked."""
+
+
+@functools.lru_cache(maxsize=4)
+def _planes(tables: SceneTables) -> Float[np.ndarray, "K N 4"]:
+    """Half-spaces of all pieces in the frames of their bodies; a round piece has those of its box."""
+    count = max(6, tables.piece_planes.shape[1])
+    planes = np.tile(np.array([0.0, 0.0, 0.0, 1.0]), (len(tables.piece_geom), count, 1))
+    planes[:, : tables.piece_planes.shape[1]] = tables.piece_planes
+    sides = np.concatenate([np.eye(3), -np.eye(3)])
+    for k in np.flatnonzero(tables.piece_kind != PieceKind.POLYHEDRON):
+        planes[k] = (0.0, 0.0, 0.0, 1.0)
+        planes[k, :6, :3], planes[k, :6, 3] = sides, (tables.piece_vertices[k] @ sides.T).max(0)
+    turn = matrices_on_host(tables.piece_quat)
+    normal = np.einsum("kij,knj->kni", turn, planes[..., :3])
+    return np.concatenate([normal, planes[..., 3:] + np.einsum("kni,ki->kn", normal, tables.piece_pos)[..., None]], -1)
+
+
+class Obstacles:
+    """The pieces of one world, but for those of some objects."""
+
+    def __init__(self, scene: Scene, view: PhysicsView, world: int = 0, without: Collection[int] = ()):
+        tables = scene.tables
+        keep = np.flatnonzero((tables.piece_object >= 0) & ~np.isin(tables.piece_object, list(without)))
+        body = tables.piece_body[keep]
+        pos = np.asarray(view.body_pos)[world, body].astype(float)
+        turn = matrices_on_host(np.asarray(view.body_quat)[world, body])
+        planes = _planes(tables)[keep]
+        self._normal = np.einsum("kij,knj->kni", turn, planes[..., :3])
+        self._offset = planes[..., 3] + np.einsum("kni,ki->kn", self._normal, pos)
+        # A plane (0, 0, 0, 1) is padding: its distance is -1, which never is the largest.
+        own = matrices_on_host(tables.piece_quat[keep])
+        corners = np.einsum("kij,kvj->kvi", own, tables.piece_vertices[keep]) + tables.piece_pos[keep][:, None]
+        corners = np.einsum("kij,kvj->kvi", turn, corners) + pos[:, None]
+        self._low, self._high = corners.min(1), corners.max(1)
+        self.objects = tables.piece_object[keep]
+
+    def distance(self, points: Float[np.ndarray, "M 3"]) -> Float[np.ndarray, "M"]:
+        """m from points to the nearest piece, at most `FAR`; negative inside."""
+        low, high = points.min(0) - FAR, points.max(0) + FAR
+        near = np.flatnonzero(((self._low <= high) & (self._high >= low)).all(1))
+        if not len(near):
+            return np.full(len(points), FAR)
+        away = np.einsum("kni,mi->mkn", self._normal[near], points) - self._offset[near]
+        return np.minimum(away.max(-1).min(-1), FAR)
+
+    def below(self, xy: Float[np.ndarray, "2"], height: float, of: Collection[int]) -> float:
+        """World z of the highest point below a height, over x and y, of some objects; -inf: there is none."""
+        mine = np.flatnonzero(np.isin(self.objects, list(of)) & (self._low[:, 2] < height))
+        best = -np.inf
+        for k in mine:
+            if (xy < self._low[k, :2]).any() or (xy > self._high[k, :2]).any():
+                continue
+            normal, offset = self._normal[k], self._offset[k]
+            left = offset - normal[:, :2] @ xy  # n_z z <= left
+            down, up, flat = normal[:, 2] < -1e-9, normal[:, 2] > 1e-9, np.abs(normal[:, 2]) <= 1e-9
+            top = (left[up] / normal[up, 2]).min(initial=np.inf)
+            bottom = (left[down] / normal[down, 2]).max(initial=-np.inf)
+            if (left[flat] >= 0).all() and bottom <= top and top <= height:
+                best = max(best, float(top))
+        return best
+
+
+def straight(
+    obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], start: np.ndarray, end: np.ndarray, spare: float = 0.0
+) -> bool:
+    """Whether spheres (x, y, z from a hand's grasp point, world axes; radius) pass along a straight line.
+
+    Args:
+      spare: m at both ends of the line within which nothing is checked: a hand touches there what it takes or leaves.
+    """
+    way = end - start
+    apart = float(np.linalg.norm(way))
+    count = max(2, int(np.ceil(apart / STEP)) + 1)
+    along = np.linspace(0, apart, count)
+    along = along[(along >= 0) & (along <= apart - spare)]
+    if not len(along) or apart < 1e-6:
+        return True
+    points = start + along[:, None] / apart * way
+    centres = (points[:, None] + spheres[None, :, :3]).reshape(-1, 3)
+    return bool((obstacles.distance(centres) >= np.tile(spheres[:, 3], len(points))).all())
+
+
+def hand_way(
+    obstacles: Obstacles,
+    spheres: Float[np.ndarray, "S 4"],
+    start: np.ndarray,
+    goal: np.ndarray,
+    spare: float = 0.0,
+    back: np.ndarray | None = None,
+) -> list[np.ndarray] | None:
+    """Points of a hand's way from one point to another, without the first; None: no way was found.
+
+    Tried are the straight line, then ways up, across and down, then those that first draw the hand back.
+
+    Args:
+      spheres, spare: see `straight`. back: where a hand is drawn back to first.
+    """
+    starts: Sequence[list[np.ndarray]] = [[]] if back is None else [[], [np.asarray(back, float)]]
+    for before in starts:
+        first = before[-1] if before else start
+        ways = [[goal]]
+        for lift in LIFTS:
+            top = max(first[2], goal[2]) + lift
+            ways.append([np.array([*first[:2], top]), np.array([*goal[:2], top]), goal])
+            ways.append([np.array([*first[:2], goal[2]]), goal])
+        for way in ways:
+            points = [start, *before, *way]
+            pairs = list(itertools.pairwise(points))
+            if all(
+                straight(obstacles, spheres, a, b, spare if k == len(pairs) - 1 else 0.0)
+                for k, (a, b) in enumerate(pairs)
+            ):
+                return [*before, *way]
+    return None

@@ -1,0 +1,149 @@
+"""Doors, drawers and lids as hands move them: where a link can be taken, and where that goes as its joint moves."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.view import PhysicsView
+from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.scene.scene import Scene
+
+OPEN_TO, STEPS = 0.75, 10
+"""Share of a joint's range to which it is opened; places of a hand on the way."""
+
+FAR_OUT, HEIGHTS = 0.85, (0.35, 1.35)
+"""Share of the distance from a hinge to the link's edge at which it is taken; m: heights at which it is best taken."""
+
+Vector = Float[np.ndarray, "3"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class OpenableJoint:
+    """One joint of one world as it is now; world frame, m and rad.
+
+    Attributes:
+      name: of the joint. object, object_index: whose it is. hinge: it turns; else it slides.
+      anchor, axis: of the hinge; the slide's axis. now, closed, open: positions. vertices: corners of the link.
+      grips: points of the face that moves ahead when it opens, with its normal, the best first.
+    """
+
+    name: str
+    object: str
+    object_index: int
+    hinge: bool
+    anchor: Vector
+    axis: Vector
+    now: float
+    closed: float
+    open: float
+    vertices: Float[np.ndarray, "V 3"]
+    grips: tuple[tuple[Vector, Vector], ...]
+
+    @property
+    def fraction(self) -> float:
+        """How far it is open, 0 to 1."""
+        return (self.now - self.closed) / (self.open - self.closed)
+
+    def moved(self, points: Float[np.ndarray, "V 3"], by: float) -> Float[np.ndarray, "V 3"]:
+        """Points of the link after the joint has moved."""
+        if not self.hinge:
+            return points + by * self.axis
+        return (points - self.anchor) @ _about(self.axis, by).T + self.anchor
+
+    def path(self, grip: tuple[Vector, Vector], opening: bool) -> list[tuple[Vector, Vector]]:
+        """Points and normals of the face where a hand is, from where the link is now to open, or to closed."""
+        goal = self.closed + OPEN_TO * (self.open - self.closed) if opening else self.closed
+        point, normal = grip
+        ways = []
+        for share in np.linspace(0, 1, STEPS):
+            by = share * (goal - self.now)
+            there = self.moved(point[None], by)[0]
+            ahead = self.moved((point + normal)[None], by)[0] - there
+            ways.append((there, ahead))
+        return ways
+
+    def sweep(self, opening: bool) -> Float[np.ndarray, "n 3"]:
+        """Corners of the link on the way."""
+        goal = self.closed + OPEN_TO * (self.open - self.closed) if opening else self.closed
+        corners = self.vertices[:: max(1, len(self.vertices) // 40)]
+        return np.concatenate([self.moved(corners, s * (goal - self.now)) for s in np.linspace(0, 1, STEPS)])
+
+
+def openable_joints(scene: Scene, view: PhysicsView, index: int, world: int = 0) -> list[OpenableJoint]:
+    """Joints of an object that count for `open`, the largest links first."""
+    tables, model = scene.tables, scene.model
+    found = []
+    for j in np.flatnonzero(tables.openable_object == index):
+        number = int(np.flatnonzero(model.jnt_qposadr == tables.openable_qposadr[j])[0])
+        body = int(model.jnt_bodyid[number])
+        turn = matrices_on_host(np.asarray(view.body_quat)[world, [body]])[0]
+        origin = np.asarray(view.body_pos)[world, body].astype(float)
+        pieces = np.flatnonzero(tables.piece_body == body)
+        if not len(pieces):
+            continue
+        own = matrices_on_host(tables.piece_quat[pieces])
+        points = np.einsum("kij,kvj->kvi", own, tables.piece_vertices[pieces]) + tables.piece_pos[pieces][:, None]
+        vertices = points.reshape(-1, 3) @ turn.T + origin
+        hinge = int(model.jnt_type[number]) == int(mujoco.mjtJoint.mjJNT_HINGE)
+        axis, anchor = turn @ model.jnt_axis[number], origin + turn @ model.jnt_pos[number]
+        now = float(np.asarray(view.joint_pos)[world, j])
+        closed, opened = float(tables.openable_closed[j]), float(tables.openable_open[j])
+        joint = OpenableJoint(
+            model.joint(number).name,
+            tables.object_names[index],
+            index,
+            hinge,
+            anchor,
+            axis,
+            now,
+            closed,
+            opened,
+            vertices,
+            (),
+        )
+        found.append(dataclasses.replace(joint, grips=_grips(joint)))
+    return sorted(found, key=lambda joint: -float(np.ptp(joint.vertices, axis=0).prod()))
+
+
+def _grips(joint: OpenableJoint) -> tuple[tuple[Vector, Vector], ...]:
+    """Points on the face that is ahead when the joint opens, far from a hinge, at heights that hands like."""
+    sign = np.sign(joint.open - joint.closed)
+    vertices = joint.vertices
+    middle = vertices.mean(0)
+    if not joint.hinge:
+        normal = sign * joint.axis
+        across = [v for v in np.eye(3) if abs(v @ normal) < 0.7]
+        face = middle + (((vertices - middle) @ normal).max()) * normal
+        return tuple((face + s * a * 0.25 * np.ptp(vertices @ a), normal) for a in across for s in (0, 1, -1))
+    radial = vertices - joint.anchor
+    radial -= np.outer(radial @ joint.axis, joint.axis)
+    farthest = radial[np.argmax(np.linalg.norm(radial, axis=1))]
+    out = middle - joint.anchor
+    out -= (out @ joint.axis) * joint.axis
+    out /= max(float(np.linalg.norm(out)), 1e-9)
+    reach = float((radial @ out).max()) if len(radial) else float(np.linalg.norm(farthest))
+    normal = sign * np.cross(joint.axis, out)
+    depth = float(((vertices - joint.anchor) @ normal).max())
+    along = (vertices - joint.anchor) @ joint.axis
+    found = []
+    for share in (0.5, 0.35, 0.65, 0.2, 0.8):
+        height = along.min() + share * np.ptp(along)
+        for part in (FAR_OUT, 0.65):
+            found.append((joint.anchor + part * reach * out + height * joint.axis + depth * normal, normal))
+
+    def comfort(grip: tuple[Vector, Vector]) -> float:
+        z = float(grip[0][2])
+        return max(HEIGHTS[0] - z, 0.0) + max(z - HEIGHTS[1], 0.0)
+
+    return tuple(sorted(found, key=comfort))
+
+
+def _about(axis: Vector, angle: float) -> Float[np.ndarray, "3 3"]:
+    """Rotation matrix."""
+    x, y, z = axis / np.linalg.norm(axis)
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)

@@ -1,0 +1,118 @@
+"""`PhysicsRung`: primitives carried out by a robot's actions, in all worlds of a stage together.
+
+Worlds plan their programs on the host when they need one; the programs of all worlds are followed in one batch. Worlds
+that have nothing to do stand still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.planning import execution
+from ig2mj.planning.bodies import HoveringBody, body_of
+from ig2mj.planning.domain import Domain
+from ig2mj.planning.facts import Facts
+from ig2mj.planning.manipulation import Primitive, Program, primitive
+from ig2mj.planning.motion_planner import MotionPlanner
+from ig2mj.planning.phases import Phase
+from ig2mj.planning.stage import Stage
+from ig2mj.planning.steps import Outcome, PlanningError, Step
+from ig2mj.planning.world import PlannedWorld
+from ig2mj.sampling.query import SceneQuery
+
+MOST_STEPS = 3000
+"""Agent steps of one primitive, 300 s, after which it fails with "timeout"."""
+
+
+class PhysicsRung:
+    """See the module's text and `ig2mj.planning.rung.Rung`."""
+
+    name = "physics"
+
+    def __init__(self, stage: Stage, seed: int = 0, first: int = 0, query: SceneQuery | None = None):
+        """
+        Args:
+          seed, first: of random streams: a stream belongs to (seed, first + world, number of the step).
+          query: a world of the stage's scene to sample spots in; None: a new one.
+
+        Raises:
+          PlanningError: the robot has no hands that planned motion can move.
+        """
+        body = body_of(stage.scene, stage.controller, stage.agent)
+        if not isinstance(body, HoveringBody):
+            name = stage.scene.tables.agent_names[stage.agent]
+            raise PlanningError(f"motion of the hands of robot '{name}' cannot be planned (the humanoid's can)")
+        self.stage, self.body = stage, body
+        self.domain = Domain(stage.model, len(body.hands))
+        self._planner = MotionPlanner(stage.scene, stage.agent)
+        self._query = query
+        self._seed, self._first = seed, first
+        count = stage.num_worlds
+        self._running: list[Primitive | None] = [None] * count
+        self._programs: list[Program] = [[] for _ in range(count)]
+        self._carry = execution.begin(self._programs)
+        self._count, self._steps = [0] * count, [0] * count
+        self._ended: dict[int, Outcome] = {}
+
+    @property
+    def num_worlds(self) -> int:
+        return self.stage.num_worlds
+
+    def world(self, world: int) -> PlannedWorld:
+        """A world as primitives see it."""
+        if self._query is None:
+            self._query = SceneQuery(self.stage.scene)
+        rng = np.random.default_rng([self._seed, self._first + world, self._count[world]])
+        return PlannedWorld(self.stage, self.body, self.domain, self._planner, self._query, world, rng)
+
+    def facts(self, world: int) -> Facts:
+        return self.world(world).facts
+
+    def begin(self, world: int, step: Step) -> None:
+        self._count[world] += 1
+        self._steps[world] = 0
+        self._running[world] = primitive(self.world(world), step)
+        self._next(world, None)
+
+    def _next(self, world: int, reason: str | None) -> None:
+        """The next program of a world's primitive, or its outcome."""
+        running = self._running[world]
+        assert running is not None
+        try:
+            program = next(running) if reason is None else running.send(reason)
+            while not program:
+                program = running.send("")
+        except StopIteration as end:
+            self._end(world, end.value)
+            return
+        self._programs[world] = program
+        new: list[list[Phase] | None] = [None] * self.num_worlds
+        new[world] = program
+        self._carry = execution.begin_some(self._carry, new, self._programs)
+
+    def _end(self, world: int, outcome: Outcome) -> None:
+        self._running[world] = None
+        self._programs[world] = []
+        seconds = self._steps[world] * ACTION_PERIOD
+        self._ended[world] = Outcome(outcome.reason, outcome.detail, seconds, outcome.attempts)
+
+    def advance(self, watch: Callable[[], None] = lambda: None) -> dict[int, Outcome]:
+        """See `Rung.advance`. `watch`: called after every agent step."""
+        while not self._ended and any(r is not None for r in self._running):
+            action, self._carry = execution.advance(self.body, self.stage.agent, self._carry, self.stage.view)
+            self.stage.act(action)
+            watch()
+            for world, running in enumerate(self._running):
+                if running is None:
+                    continue
+                self._steps[world] += 1
+                if self._steps[world] > MOST_STEPS:
+                    running.close()
+                    self._end(world, Outcome("timeout", f"{MOST_STEPS * ACTION_PERIOD:.0f} s have passed"))
+                elif not self._carry.running[world]:
+                    self._next(world, self._carry.reason(world))
+        ended, self._ended = self._ended, {}
+        return ended

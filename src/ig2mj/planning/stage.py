@@ -1,0 +1,122 @@
+"""`Stage`: worlds in which a robot acts: what the physics rung and a robot's `do` need of a batch or of one world.
+
+Axes: W worlds, n numbers of a robot's action.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.agents.base import ACTION_PERIOD, Controller
+from ig2mj.engine.base import Engine
+from ig2mj.engine.snapshot import Snapshot, fitted
+from ig2mj.engine.view import PhysicsView
+from ig2mj.predicates.compile import CompiledExpression
+from ig2mj.scene.scene import Scene
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.core import Core
+from ig2mj.worlds.pool import Pool
+from ig2mj.worlds.rules import Rules
+from ig2mj.worlds.worlds import controllers_of, grasping_of
+
+
+@runtime_checkable
+class Stage(Protocol):
+    """See the module's text.
+
+    Attributes:
+      scene: with its robots. model: of its states. controller: of the robot that acts. agent: its number.
+    """
+
+    scene: Scene
+    model: StateModel
+    controller: Controller
+    agent: int
+
+    @property
+    def num_worlds(self) -> int: ...
+
+    @property
+    def view(self) -> PhysicsView:
+        """Of the present physics."""
+        ...
+
+    @property
+    def states(self) -> ExtendedStates:
+        """Of the present worlds."""
+        ...
+
+    def snapshot(self, world: int) -> Snapshot:
+        """Physics of one world, without the world axis."""
+        ...
+
+    def act(self, action: Float[np.ndarray, "W n"]) -> None:
+        """An agent step of 1/10 s: the robot's action in its controller's units; other robots stay as they are."""
+        ...
+
+
+class CoreStage:
+    """Worlds of an engine of their own; one robot acts.
+
+    Attributes:
+      core, batch: what steps the worlds, and their present state.
+    """
+
+    agent = 0
+
+    def __init__(
+        self,
+        scene: Scene,
+        engine: Engine,
+        grasping: str = "assisted",
+        starts: Pool | None = None,
+        goal: CompiledExpression | None = None,
+    ):
+        """
+        Args:
+          scene: with the robot. engine: of this scene. grasping: see `ig2mj.Worlds`.
+          starts: of the bare scene, the first row for the first world and so on; None: the scene's own start.
+        """
+        self.scene = scene
+        rules = Rules.of_scene(scene)
+        rules = rules if goal is None else rules.with_goal(goal)
+        self.model = rules.model
+        controllers = controllers_of(scene, ACTION_PERIOD)
+        self.controller = controllers[0]
+        self._others = sum(c.action_size for c in controllers[1:])
+        self.core = Core(engine, rules, None, controllers, grasping_of(engine, grasping), True)
+        self._steps = max(1, round(ACTION_PERIOD / (engine.substeps * engine.timestep)))
+        self.batch = self.core.start(0)
+        if starts is not None:
+            self.load(starts)
+
+    @property
+    def num_worlds(self) -> int:
+        return self.core.engine.num_worlds
+
+    @property
+    def view(self) -> PhysicsView:
+        return self.batch.world.view
+
+    @property
+    def states(self) -> ExtendedStates:
+        return self.batch.world.states
+
+    def snapshot(self, world: int) -> Snapshot:
+        return self.core.engine.export(self.batch.world.physics, world)
+
+    def load(self, starts: Pool) -> None:
+        """Puts the household of each world into the state of a row; robots stay at their start."""
+        rows = starts.rows(np.arange(self.num_worlds) % starts.size)
+        one = self.core.engine.export(self.batch.world.physics, 0)
+        physics = fitted(rows.physics, one, self.num_worlds, self.scene.name)
+        self.batch = self.core.load(self.batch, physics, rows.states)
+
+    def act(self, action: Float[np.ndarray, "W n"]) -> None:
+        rest = np.zeros((len(action), self._others), np.float32)
+        whole = np.concatenate([np.asarray(action, np.float32), rest], axis=1)
+        self.batch, _ = self.core.repeat_action_fn(self.batch, whole, self._steps)

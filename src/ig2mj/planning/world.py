@@ -1,0 +1,242 @@
+"""`PlannedWorld`: one world of a stage as primitives plan in it: the robot's pose, its hands, what is where."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Iterator, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.view import PhysicsView
+from ig2mj.geometry.poses import matrices_on_host, quat_conjugate, quat_multiply, quat_rotate
+from ig2mj.planning.bodies import HoveringBody, Senses, grip_of, sense
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.domain import Domain
+from ig2mj.planning.facts import Facts
+from ig2mj.planning.motion_planner import FreeFloor, MotionPlanner
+from ig2mj.planning.stage import Stage
+from ig2mj.predicates.literals import object_index, room_index
+from ig2mj.sampling.placement import Placer
+from ig2mj.sampling.query import SceneQuery
+from ig2mj.sampling.rules import PLACEMENTS
+
+PALM, FINGERS, FINGERS_AHEAD = 0.075, 0.04, 0.085
+"""m: radii of spheres about a hand's grasp point and about its fingers, and how far these are ahead."""
+
+HELD_POINTS, HELD_MARGIN = 60, 0.012
+"""Points of what a hand holds that keep clear, and m by which they do."""
+
+Vector = Float[np.ndarray, "3"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Stance:
+    """Where a robot stands to do something: x, y (m) and yaw (rad)."""
+
+    xy: tuple[float, float]
+    yaw: float
+
+
+@dataclasses.dataclass(eq=False)
+class PlannedWorld:
+    """See the module's text.
+
+    Attributes:
+      stage, body, domain, planner: of all worlds. query: a world of the scene on the native engine, to sample spots in.
+      world: number. rng: of this primitive.
+    """
+
+    stage: Stage
+    body: HoveringBody
+    domain: Domain
+    planner: MotionPlanner
+    query: SceneQuery
+    world: int
+    rng: np.random.Generator
+
+    @property
+    def view(self) -> PhysicsView:
+        return self.stage.view
+
+    @property
+    def senses(self) -> Senses:
+        return sense(self.view, self.stage.agent, self.body.hands)
+
+    @property
+    def facts(self) -> Facts:
+        """What holds now."""
+        return Facts(self.domain, self.stage.states, self.view, self.world, held=[n for n in self.held if n])
+
+    @property
+    def held(self) -> list[str]:
+        """Name of what each hand holds, "" for an empty one. A link that a hand holds counts as its object."""
+        names = self.domain.model.tables.object_names
+        rows = self.senses.held[self.world]
+        return [names[int(np.argmax(row))] if row.any() else "" for row in rows]
+
+    @property
+    def base(self) -> tuple[Float[np.ndarray, "2"], float]:
+        """Position and direction of the robot's base."""
+        senses = self.senses
+        return senses.base_pos[self.world, :2].astype(float), float(senses.yaw[self.world])
+
+    def index(self, name: str) -> int:
+        """Number of an object."""
+        return object_index(self.domain.model, name)
+
+    def grip(self, hand: int) -> Vector:
+        """Where a hand's grasp point is."""
+        return grip_of(self.senses, hand, self.body.grips[hand])[self.world].astype(float)
+
+    def hand_quat(self, hand: int) -> Float[np.ndarray, "4"]:
+        """Orientation of a hand."""
+        return self.senses.hand_quat[self.world, hand].astype(float)
+
+    def pose(self, name: str) -> tuple[Vector, Float[np.ndarray, "4"]]:
+        """Frame of an object's main body."""
+        o = self.index(name)
+        return (
+            np.asarray(self.view.object_pos)[self.world, o].astype(float),
+            np.asarray(self.view.object_quat)[self.world, o].astype(float),
+        )
+
+    def com(self, name: str) -> Vector:
+        """Centre of mass of an object."""
+        return np.asarray(self.view.object_com)[self.world, self.index(name)].astype(float)
+
+    def obstacles(self, without: Collection[str] = ()) -> Obstacles:
+        """Pieces of everything but some objects."""
+        return Obstacles(self.stage.scene, self.view, self.world, [self.index(n) for n in without])
+
+    def vertices(self, name: str) -> Float[np.ndarray, "V 3"]:
+        """Corners of an object's collision pieces, world frame."""
+        tables = self.domain.model.tables
+        pieces = np.flatnonzero(tables.piece_object == self.index(name))
+        return self.vertices_of_pieces(pieces)
+
+    def vertices_of_pieces(self, pieces: np.ndarray) -> Float[np.ndarray, "V 3"]:
+        """Corners of collision pieces, world frame."""
+        tables = self.domain.model.tables
+        own = matrices_on_host(tables.piece_quat[pieces])
+        points = np.einsum("kij,kvj->kvi", own, tables.piece_vertices[pieces]) + tables.piece_pos[pieces][:, None]
+        body = tables.piece_body[pieces]
+        turn = matrices_on_host(np.asarray(self.view.body_quat)[self.world, body])
+        pos = np.asarray(self.view.body_pos)[self.world, body].astype(float)
+        return (np.einsum("kij,kvj->kvi", turn, points) + pos[:, None]).reshape(-1, 3)
+
+    def spheres(self, fingers: Sequence[float], holding: str = "", hand: int = 0, turn: float = 0.0) -> np.ndarray:
+        """What keeps clear about a hand's grasp point: x, y, z (world axes) and radius of each.
+
+        Args:
+          fingers: where they point. holding: what it holds, whose corners keep clear, too, turned by `turn` (rad).
+        """
+        found = [np.array([0.0, 0.0, 0.0, PALM]), np.array([*(FINGERS_AHEAD * np.asarray(fingers)), FINGERS])]
+        if holding:
+            points = self.vertices(holding) - self.grip(hand)
+            c, s = np.cos(turn), np.sin(turn)
+            points = points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+            step = max(1, len(points) // HELD_POINTS)
+            found += [np.array([*p, HELD_MARGIN]) for p in points[::step]]
+        return np.array(found)
+
+    def floor(self) -> FreeFloor:
+        """Where the robot can stand with what it holds."""
+        return self.planner.floor(self.view, without=[self.index(n) for n in self.held if n], world=self.world)
+
+    def carried(self, hand: int, stance: Stance) -> Vector:
+        """Where a hand's grasp point is carried, if the robot stood there; world frame."""
+        c, s = np.cos(stance.yaw), np.sin(stance.yaw)
+        x, y, z = self.body.carry[hand]
+        height = float(self.senses.base_pos[self.world, 2])
+        return np.array([stance.xy[0] + c * x - s * y, stance.xy[1] + s * x + c * y, height + z])
+
+    def reaches(self, hand: int, stance: Stance, point: Vector) -> bool:
+        """Whether a hand reaches a point from a stance."""
+        c, s = np.cos(stance.yaw), np.sin(stance.yaw)
+        x, y, z = self.body.shoulders[hand]
+        height = float(self.senses.base_pos[self.world, 2])
+        shoulder = np.array([stance.xy[0] + c * x - s * y, stance.xy[1] + s * x + c * y, height + z])
+        return bool(np.linalg.norm(point - shoulder) <= self.body.reach)
+
+    def stances(self, hand: int, point: Vector, floor: FreeFloor, away: float, most: int = 10) -> Iterator[Stance]:
+        """Where the robot can stand so that a hand reaches a point, the nearest and most comfortable first.
+
+        Args:
+          away: m, horizontal, that the base would like to be from the point.
+        """
+        here, _ = self.base
+        cells = np.argwhere(floor.free)
+        if not len(cells):
+            return
+        middles = floor.occupancy.middles(cells)
+        apart = np.linalg.norm(middles - point[:2], axis=1)
+        near = np.flatnonzero(apart < self.body.reach)
+        field = floor.distances(here)
+        way = field[tuple(cells[near].T)]
+        cost = 0.6 * way + 2.0 * np.abs(apart[near] - away) - 0.5 * np.minimum(floor.spare[tuple(cells[near].T)], 0.2)
+        order = near[np.argsort(cost)]
+        order = order[np.isfinite(np.sort(cost))]
+        taken: list[np.ndarray] = []
+        for k in order:
+            if any(np.linalg.norm(middles[k] - t) < 0.12 for t in taken):
+                continue
+            offset = point[:2] - middles[k]
+            side = self.body.carry[hand][1] * 0.6
+            yaw = float(np.arctan2(offset[1], offset[0]) - np.arctan2(side, max(apart[k], 0.3)))
+            stance = Stance((float(middles[k][0]), float(middles[k][1])), yaw)
+            if self.reaches(hand, stance, point):
+                taken.append(middles[k])
+                yield stance
+                if len(taken) >= most:
+                    return
+
+    def spots(self, predicate: str, name: str, where: str, turns: Sequence[float]) -> Iterator[tuple[Vector, float]]:
+        """Positions of an object's main body that make a placement true, for turns (rad) of it about the vertical."""
+        self.query.load(self.stage.snapshot(self.world))
+        index = self.index(name)
+        second = room_index(self.domain.model, where) if predicate == "on_floor" else self.index(where)
+        areas = PLACEMENTS[predicate](self.query, index, second)
+        placer = Placer(self.query)
+        _, quat = self.pose(name)
+        for turn in turns:
+            new = _yawed(quat, turn)
+            for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
+                found = 0
+                for pos in placer.spots(index, areas, new, self.rng, support):
+                    if predicate in ("on_top", "on_floor") or self._would_hold(predicate, name, where, pos, new):
+                        found += 1
+                        yield pos, turn
+                    if found >= 8:
+                        break
+                if found:
+                    break
+
+    def _would_hold(self, predicate: str, name: str, where: str, pos: Vector, quat: np.ndarray) -> bool:
+        """Whether a placement that does not depend on contact would be true."""
+        before = self.query.save()
+        self.query.place(self.index(name), pos, quat)
+        states = Facts(self.domain, self.stage.states, self.view, self.world).states
+        holds = Facts(self.domain, states, self.query.view).holds(predicate, name, where)
+        self.query.load(before)
+        return holds
+
+    def grip_for(self, hand: int, name: str, pos: Vector, turn: float) -> tuple[Vector, Float[np.ndarray, "4"]]:
+        """Grasp point and orientation of a hand that holds an object, if the object were at `pos`, turned by `turn`."""
+        own_pos, _ = self.pose(name)
+        offset = np.asarray(quat_rotate(_turn(turn), (self.grip(hand) - own_pos)), float)
+        return pos + offset, np.asarray(quat_multiply(_turn(turn), self.hand_quat(hand)), float)
+
+
+def _turn(angle: float) -> Float[np.ndarray, "4"]:
+    return np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
+
+
+def _yawed(quat: Float[np.ndarray, "4"], angle: float) -> Float[np.ndarray, "4"]:
+    turned = np.asarray(quat_multiply(_turn(angle), quat), float)
+    return turned / np.linalg.norm(turned)
+
+
+def relative(quat: Float[np.ndarray, "4"], to: Float[np.ndarray, "4"]) -> Float[np.ndarray, "4"]:
+    """The turn from one orientation to another, world frame."""
+    return np.asarray(quat_multiply(to, quat_conjugate(quat)), float)
