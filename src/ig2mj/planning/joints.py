@@ -12,8 +12,9 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.scene.scene import Scene
 
-OPEN_TO, STEPS = 0.75, 10
-"""Share of a joint's range to which it is opened; places of a hand on the way."""
+OPEN_TO, AJAR, STEPS = 0.75, 0.25, 10
+"""Shares of a joint's range to which it is opened, and to which a hand on its inner side pulls it; places of a hand on
+the way."""
 
 FAR_OUT, HEIGHTS = 0.85, (0.35, 1.35)
 """Share of the distance from a hinge to the link's edge at which it is taken; m: heights at which it is best taken."""
@@ -54,23 +55,31 @@ class OpenableJoint:
             return points + by * self.axis
         return (points - self.anchor) @ _about(self.axis, by).T + self.anchor
 
-    def path(self, grip: tuple[Vector, Vector], opening: bool) -> list[tuple[Vector, Vector]]:
-        """Points and normals of the face where a hand is, from where the link is now to open, or to closed."""
-        goal = self.closed + OPEN_TO * (self.open - self.closed) if opening else self.closed
+    def path(self, grip: tuple[Vector, Vector], fraction: float) -> list[tuple[Vector, Vector]]:
+        """Points and normals of the face where a hand is, from where the link is now to a share of its range."""
+        by = self.closed + fraction * (self.open - self.closed) - self.now
         point, normal = grip
         ways = []
         for share in np.linspace(0, 1, STEPS):
-            by = share * (goal - self.now)
-            there = self.moved(point[None], by)[0]
-            ahead = self.moved((point + normal)[None], by)[0] - there
+            there = self.moved(point[None], share * by)[0]
+            ahead = self.moved((point + normal)[None], share * by)[0] - there
             ways.append((there, ahead))
         return ways
 
-    def sweep(self, opening: bool) -> Float[np.ndarray, "n 3"]:
-        """Corners of the link on the way."""
-        goal = self.closed + OPEN_TO * (self.open - self.closed) if opening else self.closed
+    def sweep(self, fraction: float) -> Float[np.ndarray, "n 3"]:
+        """Corners of the link on that way."""
+        by = self.closed + fraction * (self.open - self.closed) - self.now
         corners = self.vertices[:: max(1, len(self.vertices) // 40)]
-        return np.concatenate([self.moved(corners, s * (goal - self.now)) for s in np.linspace(0, 1, STEPS)])
+        return np.concatenate([self.moved(corners, share * by) for share in np.linspace(0, 1, STEPS)])
+
+    @property
+    def inner_grips(self) -> tuple[tuple[Vector, Vector], ...]:
+        """Points of the other face, with its normal."""
+        found = []
+        for point, normal in self.grips:
+            away = (self.vertices - point) @ normal
+            found.append((point + float(away.min()) * normal, -normal))
+        return tuple(found)
 
 
 def openable_joints(scene: Scene, view: PhysicsView, index: int, world: int = 0) -> list[OpenableJoint]:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Generator, Sequence
 import numpy as np
 
 from ig2mj.planning.clearance import Obstacles, hand_way, straight
-from ig2mj.planning.joints import OpenableJoint, openable_joints
+from ig2mj.planning.joints import AJAR, OPEN_TO, OpenableJoint, openable_joints
 from ig2mj.planning.phases import Base, Phase, Until
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import PlannedWorld, Stance, Vector
@@ -213,7 +213,7 @@ def _plan_grasp(world: PlannedWorld, name: str, hand: int, attempt: int) -> tupl
         for stance in world.stances(hand, point, floor, AWAY):
             fingers, _ = _directions(stance, "down")
             way = hand_way(obstacles, world.spheres(fingers), world.carried(hand, stance), point + ABOVE * -DOWN)
-            if way is None or not straight(obstacles, world.spheres(fingers)[:1], way[-1], point, PALM_SPARE):
+            if way is None or not straight(obstacles, world.spheres(fingers)[:5], way[-1], point, PALM_SPARE):
                 continue
             found += 1
             if found > attempt // 2:
@@ -276,7 +276,7 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             fingers, _ = _directions(Stance((float(here[0]), float(here[1])), yaw), "down")
             target, quat = world.grip_for(hand, name, pos, turn)
             target = target + LET_GO * -DOWN
-            spheres = world.spheres(fingers, name, hand)
+            spheres = world.spheres(fingers, holding=name, hand=hand)
             way = hand_way(world.obstacles([name]), spheres, world.grip(hand), target, spare=0.03)
             if way is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
@@ -320,7 +320,7 @@ def _plan_place(
             if abs(twist) > np.pi / 3:  # the hand would be turned too far against the body
                 continue
             ahead, _ = _directions(stance, "down")
-            spheres = world.spheres(ahead, name, hand, turn)
+            spheres = world.spheres(ahead, holding=name, hand=hand, turn=turn)
             way = hand_way(obstacles, spheres, world.carried(hand, stance), target + LET_GO * -DOWN, spare=0.03)
             if way is not None:
                 return stance, pos, turn
@@ -351,10 +351,9 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             if found is None:
                 reason, detail = "no_base", f"no free floor from which a hand can move {joint.name}"
                 continue
-            stance, grips = found
-            if reason := (yield from _go(world, stance)):
+            if reason := (yield from _go(world, found.stance)):
                 continue
-            program = _joint_program(world, joint, hand, grips, value)
+            program = _joint_program(world, joint, hand, found.places, found.pulls)
             if program is None:
                 reason, detail = "no_path", f"the hand has no way to {joint.name}"
                 continue
@@ -368,23 +367,35 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
     return set_open
 
 
-def _plan_joint(
-    world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool
-) -> tuple[Stance, list[tuple[Vector, Vector]]] | None:
-    """A stance, and for each place of the hand on the way the point and the normal of the face that it is at."""
+@dataclasses.dataclass(frozen=True, eq=False)
+class _JointPlan:
+    """How a hand moves a joint: from where, and for each place on the way the point and the normal of the face that it
+    is at. pulls: it takes hold of the face; else it pushes it."""
+
+    stance: Stance
+    places: list[tuple[Vector, Vector]]
+    pulls: bool
+
+
+def _plan_joint(world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool) -> _JointPlan | None:
+    """A door is pulled open by its outer face, and pushed shut by it; where no floor is free before that face, it is
+    pulled by the inner one until it is ajar."""
+    ways = [(joint.grips, OPEN_TO, True)] if value else [(joint.grips, 0.0, False)]
+    if not value and joint.hinge and joint.fraction > AJAR + 0.1:
+        ways.append((joint.inner_grips, AJAR, True))
     floor = world.floor()
-    for grip in joint.grips:
-        places = joint.path(grip, value)
-        middle = places[len(places) // 2][0]
-        for stance in world.stances(hand, middle, floor, 0.7, most=20):
-            sweep = joint.sweep(value)
-            if all(world.reaches(hand, stance, p) for p, _ in places) and (
-                np.linalg.norm(sweep[:, :2] - np.array(stance.xy), axis=1).min() > STAND_OFF
-            ):
-                first, normal = places[0]
-                side = np.array([*stance.xy, first[2]]) - first
-                if side @ normal > 0.0:  # the robot stands before the face
-                    return stance, places
+    for grips, fraction, pulls in ways:
+        sweep = joint.sweep(fraction)[:, :2]
+        for grip in grips:
+            places = joint.path(grip, fraction)
+            first, normal = places[0]
+            for stance in world.stances(hand, places[len(places) // 2][0], floor, 0.7, most=20):
+                if (np.array([*stance.xy, first[2]]) - first) @ normal <= 0.0:
+                    continue  # the robot stands behind the face
+                if np.linalg.norm(sweep - np.array(stance.xy), axis=1).min() < STAND_OFF:
+                    continue
+                if all(world.reaches(hand, stance, p) for p, _ in places):
+                    return _JointPlan(stance, places, pulls)
     return None
 
 
@@ -393,29 +404,31 @@ STAND_OFF = 0.3
 
 
 def _joint_program(
-    world: PlannedWorld, joint: OpenableJoint, hand: int, places: list[tuple[Vector, Vector]], value: bool
+    world: PlannedWorld, joint: OpenableJoint, hand: int, places: list[tuple[Vector, Vector]], pulls: bool
 ) -> Program | None:
     first, normal = places[0]
     name = joint.object
-    quat = world.body.turned(hand, _across(normal), -normal)
+    # Fingers that push lie along the face, so that they do not enter the gap above a drawer.
+    fingers = _across(normal) if pulls else np.cross(normal, -DOWN) * (1.0 if hand == 0 else -1.0)
+    if np.linalg.norm(fingers) < 0.5:
+        fingers = _across(normal)
+    fingers = fingers / np.linalg.norm(fingers)
+    quat = world.body.turned(hand, fingers, -normal)
     before = first + ABOVE * normal
-    way = hand_way(world.obstacles([name]), world.spheres(_across(normal)), world.grip(hand), before)
+    way = hand_way(world.obstacles([name]), world.spheres(fingers, -normal), world.grip(hand), before)
     if way is None:
-        way = hand_way(world.obstacles(), world.spheres(_across(normal))[:1], world.grip(hand), before)
+        way = hand_way(world.obstacles(), world.spheres(fingers, -normal)[:5], world.grip(hand), before)
     if way is None:
         return None
     program = _travel(world, hand, way, quat)
     index = joint.object_index
-    if not value:  # a fist pushes it shut
+    if not pulls:  # an open hand pushes it shut
         program += [
-            Phase(hand=hand, pos=_tuple(p - PRESS * n), close=True, tolerance=0.03, limit=12, after="", speed=0.04)
+            Phase(hand=hand, pos=_tuple(p - PRESS * n), close=False, tolerance=0.03, limit=12, after="", speed=0.04)
             for p, n in places
         ]
         last = _tuple(places[-1][0] - 2 * PRESS * places[-1][1])
-        program += [
-            Phase(hand=hand, pos=last, close=True, until=Until.WAITED, limit=6),
-            Phase(hand=hand, close=False, until=Until.EMPTY, limit=6, after=""),
-        ]
+        program.append(Phase(hand=hand, pos=last, until=Until.WAITED, limit=6))
     else:
         program += [
             Phase(hand=hand, pos=_tuple(first - PUSH_IN * normal), quat=quat, until=Until.TOUCHED, object=index,
@@ -430,7 +443,7 @@ def _joint_program(
     return [*program, *_rest(hand), Phase(until=Until.WAITED, limit=4)]
 
 
-PUSH_IN, PRESS = 0.03, 0.012
+PUSH_IN, PRESS = 0.03, 0.004
 """m behind a face that a hand goes for which takes hold of it, and which pushes it shut."""
 
 

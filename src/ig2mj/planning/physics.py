@@ -28,7 +28,11 @@ MOST_STEPS = 3000
 
 
 class PhysicsRung:
-    """See the module's text and `ig2mj.planning.rung.Rung`."""
+    """See the module's text and `ig2mj.planning.rung.Rung`.
+
+    Attributes:
+      stage: the worlds. body: how programs move the robot. domain: constants. watch: called after every agent step.
+    """
 
     name = "physics"
 
@@ -56,6 +60,7 @@ class PhysicsRung:
         self._carry = execution.begin(self._programs)
         self._count, self._steps = [0] * count, [0] * count
         self._ended: dict[int, Outcome] = {}
+        self.watch: Callable[[], None] = lambda: None
 
     @property
     def num_worlds(self) -> int:
@@ -99,12 +104,12 @@ class PhysicsRung:
         seconds = self._steps[world] * ACTION_PERIOD
         self._ended[world] = Outcome(outcome.reason, outcome.detail, seconds, outcome.attempts)
 
-    def advance(self, watch: Callable[[], None] = lambda: None) -> dict[int, Outcome]:
-        """See `Rung.advance`. `watch`: called after every agent step."""
+    def advance(self) -> dict[int, Outcome]:
+        """See `Rung.advance`."""
         while not self._ended and any(r is not None for r in self._running):
             action, self._carry = execution.advance(self.body, self.stage.agent, self._carry, self.stage.view)
             self.stage.act(action)
-            watch()
+            self.watch()
             for world, running in enumerate(self._running):
                 if running is None:
                     continue

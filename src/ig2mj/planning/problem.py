@@ -36,7 +36,7 @@ class Problem:
 
     Attributes:
       name: of the activity, or of the scene. scene: without robots. model: of its states. goal: compiled for the scene.
-      task: of the activity; None: a goal of one's own.
+      task: of the activity; None: a goal of one's own. objects: that are added to the home (`load_scene`).
     """
 
     name: str
@@ -44,6 +44,7 @@ class Problem:
     model: StateModel
     goal: CompiledExpression
     task: Any = None
+    objects: tuple[str, ...] = ()
 
     def pool(self, split: str = "held_out", count: int = 1) -> Pool | None:
         """The activity's first start states, sampled where they are not kept yet; None: the scene's own start.
@@ -75,14 +76,14 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) 
         scene = load_bound(task.binding)
         model = StateModel.of_manifest(scene.tables, scene.manifest)
         compiled = conditions(task.binding).compile_goal(model) if goal is None else _compiled(model, goal)
-        return Problem(short, scene, model, compiled, task)
+        return Problem(short, scene, model, compiled, task, task.binding.additions)
     if short in TASKS:
         task = load_task(short)
         if not isinstance(task, Task):
             raise PlanningError(f"{short} has no goal expression to plan for (MotionPlanner.plan_base plans ways)")
         scene = load_scene(task.home, objects=task.objects)
         model = StateModel.of_manifest(scene.tables, scene.manifest)
-        return Problem(short, scene, model, _compiled(model, goal or task.goal), task)
+        return Problem(short, scene, model, _compiled(model, goal or task.goal), task, task.objects)
     if goal is None:
         try:
             load_scene(what)
@@ -91,7 +92,7 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) 
         raise PlanningError(f'{what} is a scene: give a goal, such as "(inside apple_0 fridge_0)"')
     scene = load_scene(what, objects=objects)
     model = StateModel.of_manifest(scene.tables, scene.manifest)
-    return Problem(scene.name, scene, model, _compiled(model, goal))
+    return Problem(scene.name, scene, model, _compiled(model, goal), objects=tuple(objects))
 
 
 def _compiled(model: StateModel, goal: str) -> CompiledExpression:

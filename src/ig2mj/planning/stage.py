@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
+import jax
 import numpy as np
 from jaxtyping import Float
 
 from ig2mj.agents.base import ACTION_PERIOD, Controller
-from ig2mj.engine.base import Engine
+from ig2mj.engine.base import Engine, Write
 from ig2mj.engine.snapshot import Snapshot, fitted
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates.compile import CompiledExpression
@@ -115,6 +116,12 @@ class CoreStage:
         one = self.core.engine.export(self.batch.world.physics, 0)
         physics = fitted(rows.physics, one, self.num_worlds, self.scene.name)
         self.batch = self.core.load(self.batch, physics, rows.states)
+
+    def write(self, write: Write) -> None:
+        """Changes physics of all worlds; of one world, the change is made in all of them."""
+        count = self.num_worlds
+        whole = jax.tree.map(lambda a: np.broadcast_to(np.asarray(a), (count, *np.shape(a)[1:])), write)
+        self.batch = self.core.write(self.batch, whole)
 
     def act(self, action: Float[np.ndarray, "W n"]) -> None:
         rest = np.zeros((len(action), self._others), np.float32)

@@ -21,8 +21,9 @@ from ig2mj.sampling.placement import Placer
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.rules import PLACEMENTS
 
-PALM, FINGERS, FINGERS_AHEAD = 0.075, 0.04, 0.085
-"""m: radii of spheres about a hand's grasp point and about its fingers, and how far these are ahead."""
+RADIUS, CORNER, BEHIND, ALONG = 0.03, 0.03, 0.014, (0.07, 0.1)
+"""m: of the spheres of a hand: radius; of the palm's corners from its middle, along the fingers and across; of the palm
+behind the grasp point; of the fingers ahead of it."""
 
 HELD_POINTS, HELD_MARGIN = 60, 0.012
 """Points of what a hand holds that keep clear, and m by which they do."""
@@ -125,13 +126,25 @@ class PlannedWorld:
         pos = np.asarray(self.view.body_pos)[self.world, body].astype(float)
         return (np.einsum("kij,kvj->kvi", turn, points) + pos[:, None]).reshape(-1, 3)
 
-    def spheres(self, fingers: Sequence[float], holding: str = "", hand: int = 0, turn: float = 0.0) -> np.ndarray:
-        """What keeps clear about a hand's grasp point: x, y, z (world axes) and radius of each.
+    def spheres(
+        self,
+        fingers: Sequence[float] | np.ndarray,
+        palm: Sequence[float] | np.ndarray = (0.0, 0.0, -1.0),
+        holding: str = "",
+        hand: int = 0,
+        turn: float = 0.0,
+    ) -> np.ndarray:
+        """What keeps clear about a hand's grasp point: x, y, z (world axes) and radius of each; five of the palm first.
 
         Args:
-          fingers: where they point. holding: what it holds, whose corners keep clear, too, turned by `turn` (rad).
+          fingers, palm: where they point, and it faces. holding: what it holds, whose corners keep clear, too.
+          turn: rad about the vertical by which that is turned.
         """
-        found = [np.array([0.0, 0.0, 0.0, PALM]), np.array([*(FINGERS_AHEAD * np.asarray(fingers)), FINGERS])]
+        ahead, back = np.asarray(fingers, float), -BEHIND * np.asarray(palm, float)
+        side = np.cross(ahead, np.asarray(palm, float))
+        corners = [(0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
+        centres = [back + CORNER * (a * ahead + b * side) for a, b in corners] + [back + a * ahead for a in ALONG]
+        found = [np.array([*c, RADIUS]) for c in centres]
         if holding:
             points = self.vertices(holding) - self.grip(hand)
             c, s = np.cos(turn), np.sin(turn)

@@ -10,9 +10,10 @@ import numpy as np
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.base import Write
 from ig2mj.engine.view import PhysicsView
-from ig2mj.errors import ActionError, EngineError
+from ig2mj.errors import ActionError, EngineError, UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.sampling.row import Row
+from ig2mj.simulation.agent import Agent
 from ig2mj.worlds.hands import Held
 
 if TYPE_CHECKING:
@@ -34,12 +35,22 @@ class RobotsOfWorld:
         self._steps = max(1, round(ACTION_PERIOD / (engine.substeps * engine.timestep)))
         self.controllers: tuple[Any, ...] = self._core.controls.first()
         self.held: Held = self._core.hands.read(simulation.physics)
+        self._agents: dict[str, Agent] = {}
 
     def of(self, simulation: Simulation) -> RobotsOfWorld:
         """The same robots in a copy of the simulation."""
         new = copy.copy(self)
-        new._simulation = simulation
+        new._simulation, new._agents = simulation, {}
         return new
+
+    def __getitem__(self, name: str) -> Agent:
+        """A robot by its name. Raises UnknownNameError; PlanningError: its motion cannot be planned."""
+        names = self._simulation.scene.tables.agent_names
+        if name not in names:
+            raise UnknownNameError("robot", name, names)
+        if name not in self._agents:
+            self._agents[name] = Agent(self._simulation, name)
+        return self._agents[name]
 
     @property
     def action_names(self) -> tuple[str, ...]:

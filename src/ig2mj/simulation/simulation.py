@@ -37,6 +37,7 @@ from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Objects, Scene, scene_with
 from ig2mj.simulation import images
+from ig2mj.simulation.agent import Agent, only_agent
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
 from ig2mj.simulation.recording import Recorded
 from ig2mj.simulation.robots import RobotsOfWorld, after_write, put_row, remembered
@@ -172,6 +173,15 @@ class Simulation(Recorded):
         if self._robots is None:
             self._robots = RobotsOfWorld(self)
         return self._robots
+
+    @property
+    def agent(self) -> Agent:
+        """The only robot: `simulation.agent.do("grasp", "apple_0")`; of several, `simulation.robots[NAME]`.
+
+        Raises:
+          EngineError: there is none, or there are several. PlanningError: its motion cannot be planned.
+        """
+        return only_agent(self)
 
     @property
     def _rules(self) -> Rules:

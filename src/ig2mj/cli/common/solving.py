@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import dataclasses
+import pathlib
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, Group
@@ -12,11 +15,93 @@ from rich.text import Text
 from ig2mj.cli.common.printing import make_table, stdout_console
 
 if TYPE_CHECKING:
+    from ig2mj.planning.problem import Problem
     from ig2mj.planning.solver import EpisodeResult, StepRecord
-    from ig2mj.planning.task_planner import TaskPlan
+    from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
+    from ig2mj.simulation import Simulation
+    from ig2mj.viewer.video import VideoWriter
+    from ig2mj.worlds.pool import Pool
 
 AHEAD = 8
 """Steps of the plan that are shown before they are carried out."""
+
+
+VIDEO_SIZE, FRAMES_PER_SECOND = (640, 480), 10
+"""Pixels and 1/s of videos: one frame for each agent step."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """How episodes are solved: arguments of `ig2mj solve`."""
+
+    robot: str
+    worlds: int
+    symbolic: bool
+    doors_open: bool
+    seed: int
+    seconds: float
+    record: pathlib.Path | None
+    video: pathlib.Path | None
+
+
+def solved(
+    problem: Problem,
+    planner: TaskPlanner,
+    pool: Pool | None,
+    numbers: Sequence[int],
+    options: Options,
+    table: StepTable,
+) -> Iterator[tuple[int, EpisodeResult]]:
+    """Solves episodes; their numbers and results, each as soon as it is there."""
+    from ig2mj.planning.solver import solve
+    from ig2mj.planning.symbolic import symbolic_episodes
+
+    limits: dict[str, Any] = {"seconds": options.seconds, "watch": table.watch}
+    if options.symbolic:
+        for number, rung in symbolic_episodes(planner.domain, problem.scene, pool, numbers, options.seed):
+            table.begin(number)
+            yield number, solve(planner, rung, **limits)[0]
+        return
+    from ig2mj.simulation.solving import batched_episodes, simulated_episodes
+
+    start = (problem, options.robot, pool, numbers)
+    if options.worlds > 1:
+        for chosen, rung in batched_episodes(*start, options.worlds, options.seed, options.doors_open):
+            table.begin(chosen[0])
+            yield from zip(chosen, solve(planner, rung, **limits), strict=True)
+        return
+    with contextlib.ExitStack() as files:
+        film = recorder = None
+        for number, rung, simulation in simulated_episodes(*start, options.seed, options.doors_open):
+            table.begin(number)
+            if options.record is not None and recorder is None:
+                recorder = files.enter_context(simulation.record(options.record))
+            if options.video is not None and film is None:
+                film = files.enter_context(_film(options.video))
+            if film is not None:
+                rung.watch = _filming(film, simulation)
+            yield number, solve(planner, rung, **limits)[0]
+
+
+def _film(file: pathlib.Path) -> VideoWriter:
+    from ig2mj.viewer.video import VideoWriter
+
+    return VideoWriter(file, *VIDEO_SIZE, FRAMES_PER_SECOND)
+
+
+def _filming(film: VideoWriter, simulation: Simulation) -> Callable[[], None]:
+    """Adds a frame, seen from behind the robot and above."""
+    import numpy as np
+
+    from ig2mj.viewer.offscreen import FreeView
+
+    def add() -> None:
+        agent = simulation.view.agent
+        x, y, z = (float(v) for v in np.asarray(agent.base_pos)[0, 0])
+        camera = FreeView(lookat=(x, y, z), distance=3.0, azimuth=60.0, elevation=-45.0)
+        film.add(simulation.render(camera, width=VIDEO_SIZE[0], height=VIDEO_SIZE[1]))
+
+    return add
 
 
 class StepTable:
@@ -38,9 +123,9 @@ class StepTable:
         if self._live is not None:
             self._live.__exit__(*error)
 
-    def begin(self, number: int, count: int) -> None:
+    def begin(self, number: int) -> None:
         """An episode begins."""
-        self._heading = f"{self._title}: episode {number + 1} of {count}"
+        self._heading = f"{self._title}: episode {number}"
 
     def watch(self, world: int, plan: TaskPlan, records: Sequence[StepRecord]) -> None:
         """As `ig2mj.planning.solver.Watch`."""
