@@ -29,6 +29,7 @@ def test_the_humanoid_takes_an_apple_puts_it_on_the_table_and_works_a_cabinet(ti
     assert agent.facts.held == ()
 
 
+@pytest.mark.slow
 def test_requests_that_cannot_be_carried_out_are_refused(tiny_home_folder):
     simulation = simulation_of(tiny_home_folder, Humanoid().at(-1.4, -1.2, 0.0))
     agent = simulation.agent

@@ -81,6 +81,8 @@ def sense(view: PhysicsView, agent: int, hands: Int[np.ndarray, "H"]) -> Senses:
     )
 
 
+Direction = Sequence[float] | np.ndarray
+
 Rows = Mapping[str, np.ndarray]
 """The present phases, from `Programs.at`."""
 
@@ -208,7 +210,7 @@ class HoveringBody(_Body):
         own = [np.asarray(quat_rotate_inverse(senses.base_quat, v.astype(np.float32))) for v in (move, turn)]
         return np.concatenate(own, axis=1)
 
-    def turned(self, hand: int, fingers: Sequence[float], palm: Sequence[float]) -> tuple[float, float, float, float]:
+    def turned(self, hand: int, fingers: Direction, palm: Direction) -> tuple[float, float, float, float]:
         """Orientation of a hand whose fingers point, and whose palm faces, along directions at right angles."""
         z, y = np.asarray(palm, float), np.asarray(fingers, float) * (1.0 if hand == 0 else -1.0)
         matrix = np.stack([np.cross(y, z), y, z], axis=-1)

@@ -154,6 +154,11 @@ def _tuple(v) -> tuple[float, float, float]:
     return (x, y, z)
 
 
+def _quat(q) -> tuple[float, float, float, float]:
+    w, x, y, z = (float(c) for c in q)
+    return (w, x, y, z)
+
+
 # Grasp and release.
 
 
@@ -281,7 +286,7 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             if way is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
-            keeps, turned = world.index(name), tuple(map(float, quat))
+            keeps, turned = world.index(name), _quat(quat)
             program = [
                 *_travel(world, hand, way, turned, keeps=keeps),
                 Phase(hand=hand, pos=_tuple(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1,

@@ -33,10 +33,17 @@ class Stage(Protocol):
       scene: with its robots. model: of its states. controller: of the robot that acts. agent: its number.
     """
 
-    scene: Scene
-    model: StateModel
-    controller: Controller
-    agent: int
+    @property
+    def scene(self) -> Scene: ...
+
+    @property
+    def model(self) -> StateModel: ...
+
+    @property
+    def controller(self) -> Controller: ...
+
+    @property
+    def agent(self) -> int: ...
 
     @property
     def num_worlds(self) -> int: ...

@@ -119,9 +119,9 @@ class Agent:
 
 def only_agent(simulation: Simulation) -> Agent:
     """The robot of a simulation that has one. Raises EngineError: it has none, or several."""
-    names = simulation.scene.tables.agent_names
+    names = list(simulation.scene.tables.agent_names)
     if not names:
         raise EngineError("the scene was loaded without robots (add one with load_scene(..., agents=[...]))")
     if len(names) > 1:
-        raise EngineError(f"the scene has {len(names)} robots: name one, simulation.robots['{names[0]}']")
+        raise EngineError(f"the scene has {len(names)} robots: name one, such as simulation.robots['{names[0]}']")
     return simulation.robots[names[0]]
