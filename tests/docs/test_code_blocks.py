@@ -42,6 +42,7 @@ PARSED_ONLY = {
     "ig2mj rollout CookingMeat --agent expert": "samples start states for a minute; run by tests of its own",
     "ig2mj demos": "needs what the lines before it make",
     "ig2mj vr": "waits for a person",
+    "ig2mj solve small_home '(inside": "takes a minute; run by tests of its own",
     "ig2mj calibrate": "takes minutes on a CPU",
     "ig2mj homes make": "takes half a minute; run by tests of its own",
     "ig2mj sample my_home": "needs what the line before it makes",

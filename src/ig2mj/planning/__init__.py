@@ -6,6 +6,8 @@ after each. docs/design/planning.md describes how they fit together.
 
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
+from ig2mj.planning.motion_planner import BasePlan, MotionPlanner
+from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.problem import Problem, problem_of
 from ig2mj.planning.solver import EpisodeResult, StepRecord, solve, summary
 from ig2mj.planning.steps import PRIMITIVES, REASONS, Outcome, PlanningError, Step, make_step
@@ -16,10 +18,13 @@ from ig2mj.process.public_names import offer_modules
 __all__ = [
     "PRIMITIVES",
     "REASONS",
+    "BasePlan",
     "Domain",
     "EpisodeResult",
     "Facts",
+    "MotionPlanner",
     "Outcome",
+    "PhysicsRung",
     "PlanningError",
     "Problem",
     "Step",
