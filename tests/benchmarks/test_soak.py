@@ -109,6 +109,7 @@ def test_a_dumped_world_runs_again_natively(watch, tmp_path):
     assert steps[-1]["place"][2] == pytest.approx(0.5 + 5 * 5 / 30 - 0.5 * 9.8 * (5 / 30) ** 2, abs=0.03)
 
 
+@pytest.mark.slow
 def test_energy_of_a_thrown_box_is_seen_and_what_no_servo_can_have_given_is_counted(watch):
     energy = soak_energy.EnergyWatch(watch.engine, watch.loose, episode=40)
     number, worlds = watch.engine.scene.object_index("box"), watch.engine.num_worlds

@@ -89,6 +89,7 @@ def test_what_lies_too_far_away_is_not_followed(three_worlds):
         assert (palm > low).all() and (palm < high).all()
 
 
+@pytest.mark.slow
 def test_a_world_without_numbers_keeps_its_controls(three_worlds):
     _, course, reach = three_worlds
     view, pusher = course[30]

@@ -90,6 +90,7 @@ def test_coacd_ends_when_the_converter_is_killed(tmp_path):
     assert wait_for(lambda: not alive(child))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mishap", ["while True: pass", "import os; os.abort()"])
 def test_what_time_or_a_signal_made_worse_is_tried_again_next_time(mishap, monkeypatch, own_cache):
     with monkeypatch.context() as patch:

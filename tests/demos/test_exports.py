@@ -103,6 +103,7 @@ def test_a_demonstration_says_how_its_environment_is_made_again(exported, record
     assert set(made) <= set(Overrides.__annotations__)
 
 
+@pytest.mark.slow
 def test_episodes_that_were_cut_off_are_marked_and_left_out(mixed, tmp_path, capsys):
     file, env = mixed
     with Recording(file) as recording:

@@ -53,6 +53,7 @@ def test_outside_the_block_warp_is_as_it_came():
     assert wp.jax_callable is original
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kernels", ["own", "upstream"])
 def test_a_step_of_an_engine_leaves_out_what_its_scene_does_not_have(tiny_home, monkeypatch, kernels):
     called = []

@@ -91,6 +91,7 @@ def test_worlds_do_not_start_before_the_kernels_are_there(engine, held, monkeypa
     assert events == ["run"] and engine.loading.result() > 0
 
 
+@pytest.mark.slow
 def test_programs_are_compiled_while_kernels_are_loaded(engine, held, monkeypatch):
     core = Core(engine, Rules.of_scene(engine.scene))
     compiled: list[str] = []

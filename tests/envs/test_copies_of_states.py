@@ -216,6 +216,7 @@ def test_declared_sizes_are_looked_at_before_anything_is_unpacked(env, file, tmp
             env.load(bomb)
 
 
+@pytest.mark.slow
 def test_no_damage_raises_anything_but_an_input_error(env, file, tmp_path):
     """Mutations of 200 seeds: cuts, flipped bytes, bytes that are taken out."""
     whole, refused = file.read_bytes(), 0

@@ -151,6 +151,7 @@ class Clip:
         """Nothing is written."""
 
 
+@pytest.mark.slow
 def test_gymnasium_records_videos(monkeypatch, tmp_path):
     """`RecordVideo` with a stand-in for MoviePy; with MoviePy itself: tests/interop/gymnasium_video."""
     for name in ("moviepy", "moviepy.video", "moviepy.video.io", "moviepy.video.io.ImageSequenceClip"):

@@ -54,6 +54,7 @@ def test_a_book_that_was_pushed_off_is_no_success_in_the_hand():
         assert outcome.outcomes == {"success_in_hand": [in_hand, in_hand]}
 
 
+@pytest.mark.slow
 def test_an_episode_whose_world_is_lost_counts_as_lost_and_the_others_count_as_ever(cooking_meat):
     """Of eight episodes that ran beside each other none was counted, since the engine's error ended them all."""
     env = cooking_meat.with_horizon(6)

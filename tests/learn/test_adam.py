@@ -20,6 +20,7 @@ def gradients(devices: int) -> Any:
     return {name: jnp.asarray(rng.normal(size=(devices, *shape)), jnp.float32) for name, shape in SHAPES.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("largest", [0.5, 100.0])  # cut down, and not
 def test_a_step_is_that_of_the_mean_gradient(largest):
     slopes = gradients(4)

@@ -25,6 +25,7 @@ def test_both_ways_give_the_same_and_the_same_gradients(shape, stride):
         np.testing.assert_allclose(a, b, atol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("platform", "convolves"), [("cpu", False), ("cuda", True)])
 def test_a_program_convolves_as_its_platform_does(platform, convolves):
     encoder, pictures = Convolutions((32, 32, 4), "points"), jnp.zeros((2, 32 * 32 * 4), jnp.uint8)

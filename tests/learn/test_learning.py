@@ -57,6 +57,7 @@ def test_a_point_learns_to_reach_its_goal(kind, iterations):
     assert result.row["success"] >= 0.95
 
 
+@pytest.mark.slow
 def test_an_environment_that_cannot_be_compiled_is_learned_by_the_same_loop():
     env = PointMass(64, pure=False)
     result = train(env, made(env, PPO), quiet(iterations=150))

@@ -180,6 +180,7 @@ def test_rows_that_are_kept_are_those_of_the_whole_picture():
         Perception(env.observation_spaces, "rgbd", 16, (12, 20))
 
 
+@pytest.mark.slow
 def test_a_policy_that_acts_on_its_prediction_takes_it_along(tmp_path):
     env = SeenPointMass(2)
     spaces = {**env.observation_spaces, "privileged_state": Space((7,), np.float32, -np.inf, np.inf)}
@@ -258,6 +259,7 @@ def test_the_depth_at_the_brightest_point_is_seen():
     assert np.allclose(found, [[1, 1, 1, 1, 1]], atol=1e-4), "row, column, depth, and depth times them"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("encoder", "moved"), [(GlimpseEncoder((12, 16, 4), 15, 2), False), (ConvEncoder((12, 16, 4), "points", 15), True)]
 )
@@ -283,6 +285,7 @@ def test_whether_actions_train_the_encoder(encoder, moved):
     assert of_the_guess > 0, "the guess always does"
 
 
+@pytest.mark.slow
 def test_how_an_object_is_turned_is_learnt_from_its_own_glimpse_which_nothing_else_trains():
     actor = Actor(2, (8,), GlimpseEncoder((12, 16, 4), 15, 2))
     vector, picture = jnp.ones((4, 2)), jax.random.randint(jax.random.PRNGKey(0), (4, 768), 0, 256).astype(jnp.uint8)
@@ -308,6 +311,7 @@ def test_how_an_object_is_turned_is_learnt_from_its_own_glimpse_which_nothing_el
         assert rest["glimpse_0"] == rest["glimpse_1"] == 0 and rest["points"] > 0
 
 
+@pytest.mark.slow
 def test_half_precision_on_a_gpu_sees_nearly_the_same(monkeypatch):
     encoder = GlimpseFeatures((12, 16, 4), 1)
     picture = jax.random.randint(jax.random.PRNGKey(0), (3, 12 * 16 * 4), 0, 256).astype(jnp.uint8)
@@ -319,6 +323,7 @@ def test_half_precision_on_a_gpu_sees_nearly_the_same(monkeypatch):
     assert 0 < np.abs(full - half).max() < 0.1
 
 
+@pytest.mark.slow
 def test_glimpses_look_beside_their_points_while_they_learn():
     encoder = GlimpseFeatures((48, 64, 4), 2)
     picture = jax.random.randint(jax.random.PRNGKey(0), (2, 48 * 64 * 4), 0, 256).astype(jnp.uint8)

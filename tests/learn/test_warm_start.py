@@ -34,6 +34,7 @@ def policy(tmp_path_factory):
     return algorithm, learner, Policy.load(file)
 
 
+@pytest.mark.slow
 def test_an_actor_with_a_memory_first_does_what_the_policy_does(policy):
     algorithm, learner, loaded = policy
     remembers = made("poses")
@@ -66,6 +67,7 @@ def test_other_networks_and_files_without_scales_are_refused(policy):
             init_from_policy(made(actor_layers=(16,)), dataclasses.replace(loaded, card={**loaded.card, "net": net}), 0)
 
 
+@pytest.mark.slow
 def test_who_guesses_nothing_needs_no_scales_of_what_is_hidden(tmp_path):
     algorithm = made("none", encoder="small", aux_coef=0.0)
     learner = jax.jit(algorithm.init)(jax.random.PRNGKey(7))

@@ -163,6 +163,7 @@ def shoot(engine, model, physics):
     return lambda states, now=physics: jax.tree.map(np.asarray, call(now, view, states))
 
 
+@pytest.mark.slow
 def test_pictures_find_their_cuda_graphs_by_arrays_with_elements(engine, model, physics, monkeypatch):
     called, trace = [], Filled.__call__
 

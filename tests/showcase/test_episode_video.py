@@ -33,6 +33,7 @@ def test_a_film_shows_one_episode_and_its_end(tmp_path):
     assert len(frames) == 2 * BETWEEN + LAST
 
 
+@pytest.mark.slow
 def test_where_a_robot_drives_the_camera_goes_along_and_the_goal_is_marked(tmp_path, monkeypatch):
     env = ig2mj.make("PointNavigation", engine="native", split="held_out", pool_size=4).with_horizon(4)
     seen = []

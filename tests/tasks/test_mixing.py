@@ -14,6 +14,7 @@ from ig2mj.tasks.pools import bare_scene, pool_of
 NAMES = ["apple_0", "carving_knife_0"]
 
 
+@pytest.mark.slow
 def test_objects_lie_where_they_do_in_one_state_turned_as_in_another():
     task = ACTIVITIES["SlicingFruit"]
     env = ig2mj.make("SlicingFruit", "humanoid", 2, "native", pool_size=4, augment_starts=200)

@@ -12,6 +12,7 @@ from ig2mj.tasks.navigation.starts import _Households
 from ig2mj.tasks.registry import load_task
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["RoomRearrangement", "InteractiveNavigation"])
 def test_furniture_that_is_opened_and_things_on_the_floor_move_nothing_else(name):
     task = load_task(name)

@@ -48,6 +48,7 @@ def test_every_activity_s_pool_ships_in_the_usual_size(split):
         assert load_pool(states.shipped, states.scene).size >= COUNT[split]
 
 
+@pytest.mark.slow
 def test_no_start_state_for_training_is_held_out():
     for task in TASKS:
         rows = [np.asarray(pool_of(task, split).physics.qpos) for split in SEEDS]

@@ -39,6 +39,7 @@ def told(hidden: PrivilegedTargets, scales: Any, vector: np.ndarray) -> np.ndarr
     return np.asarray(hidden(jnp.asarray(vector), jnp.asarray((vector - scales[0]) / scales[1])))
 
 
+@pytest.mark.slow
 def test_an_actor_is_wrong_by_as_much_as_what_it_remembers():
     hidden, recall, scales = setting()
     rng = np.random.default_rng(0)
@@ -124,6 +125,7 @@ def fruit():
     return env, env.reset(0)
 
 
+@pytest.mark.slow
 def test_an_expert_goes_where_an_object_is_believed_to_be(fruit):
     """As it does where everything that it sees of the object lies there."""
     env, state = fruit

@@ -167,6 +167,7 @@ def test_labels_that_only_the_first_picture_tells_are_learnt():
     assert losses[-1] < 0.1 * losses[0]
 
 
+@pytest.mark.slow
 def test_a_policy_file_remembers_as_what_was_trained(tmp_path):
     algorithm, env = made(), SeenPointMass(4)
     assert algorithm.memory is not None

@@ -13,6 +13,7 @@ from ig2mj.learn.perception import Perception
 NAMES = ("privileged_state", "depth")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["humanoid", "fetch"])
 def test_objects_are_seen_where_the_lens_says(robot):
     env = ig2mj.make("SlicingFruit", robot, 8, "native", pool_size=4, observations=NAMES)
