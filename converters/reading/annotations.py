@@ -17,6 +17,7 @@ rpy = [0.0, 0.0, 90.0]
 from __future__ import annotations
 
 import dataclasses
+import math
 import pathlib
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -31,7 +32,7 @@ from ig2mj.knowledge.overrides import Changes, Parameters, check_parameters
 from ..base.description import MetaLink, ObjectModel
 from ..base.text import without_mark
 from ..base.xml_reader import read_bytes
-from .json_reader import scalar, vector
+from .json_reader import vector
 
 POINTS = ("heat_source", "toggle_button", "water_source", "water_sink")
 BOXES = ("slicer", "cleaning_tool_area")
@@ -100,10 +101,11 @@ def _ability(name: str, value: Any, file: pathlib.Path) -> Parameters | None:
         raise InputError(file, f"is {value!r}", element=element, fix="true, false, or a table of its parameters")
     if isinstance(value, bool):
         return {} if value else None
-    parameters: Parameters = {
-        key: given if isinstance(given, bool) else scalar(given, file, f"{element}.{key}")
-        for key, given in value.items()
-    }
+    parameters: Parameters = {}
+    for key, given in value.items():
+        if not isinstance(given, bool | int | float) or not math.isfinite(given):
+            raise InputError(file, f"is {given!r}", element=f"{element}.{key}", fix="a finite number, or true or false")
+        parameters[key] = given if isinstance(given, bool) else float(given)
     check_parameters(file, element, name, parameters)
     return parameters
 

@@ -78,9 +78,16 @@ def test_objects_are_given_several_times_and_one_without_a_place_is_reported(cap
     assert err.count("note: ") == 1 and "cup_0 stands outside the house" in err and "@on_top:" in err
 
 
-def test_states_still_takes_names_of_the_homes_objects(capsys, tiny_home_folder, cup):
-    status, out, err = call(
-        capsys, "states", tiny_home_folder, "--object", "can", "box", "--object", f"{cup}@0,0,1,0", "--json"
-    )
-    assert status == 0 and set(json.loads(out)["objects"]) == {"can", "box"}
-    assert "'--object can' is now '--only can'" in err
+def test_states_still_takes_names_of_the_homes_objects_with_a_remark(capsys, tiny_home_folder, cup):
+    from ig2mj.cli.states import _added
+
+    assert _added(tiny_home_folder, ["can", str(cup), "box"]) == ([str(cup)], ["can", "box"])
+    assert "'--object can' is now '--only can'" in capsys.readouterr().err
+
+
+def test_old_names_take_several_values_after_one_option():
+    from ig2mj.cli.common.deprecated import with_new_names
+    from ig2mj.cli.sample import run
+
+    words = with_new_names(run, "ig2mj sample", ["birch", "--add", "apple", "plate", "--count", "2"])
+    assert words == ["birch", "--object", "apple", "--object", "plate", "--count", "2"]
