@@ -22,6 +22,8 @@ GPU = "needs a GPU"
 
 PARSED_ONLY = {
     "ig2mj convert": "needs a dataset or an object of the reader's",
+    "ig2mj objects show": "needs an object of the reader's",
+    "ig2mj objects add": "needs objects of the reader's",
     "ig2mj view": "opens a window",
     "ig2mj play": "opens a window",
     "ig2mj web": "runs until someone interrupts",
@@ -72,6 +74,7 @@ LONG = {
     "sensors",
     "batches",
     "sampling",
+    "objects",
     "activities",
     "index",
     "README",
