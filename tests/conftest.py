@@ -146,6 +146,15 @@ def tiny_home(tiny_home_folder: Path):
     return ig2mj.load_scene(tiny_home_folder)
 
 
+@pytest.fixture
+def registered():
+    """What a test registers (`ig2mj.register`) is forgotten after it."""
+    import registries
+
+    with registries.restored():
+        yield
+
+
 @pytest.fixture(scope="session")
 def cooking_meat():
     """CookingMeat with the humanoid in two worlds, and a pool of four; shared, since it takes long to compile."""

@@ -8,7 +8,6 @@ import pathlib
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 
 import pytest
 
@@ -203,15 +202,6 @@ def test_an_overlay_is_one_file_and_one_line(told):
 
 def test_a_mesh_format_is_one_file_and_one_line(told):
     assert told["faces"] == [4]
-
-
-@pytest.fixture
-def registered() -> Iterator[None]:
-    """What a test registers is forgotten after it."""
-    before = dict(registry.ROBOTS)
-    yield
-    registry.ROBOTS.clear()
-    registry.ROBOTS.update(before)
 
 
 @pytest.mark.usefixtures("registered")

@@ -22,6 +22,7 @@ LAYERS = [
     "callbacks",
     "files",
     "process",
+    "plugins",
     "cluster",
     "knowledge",
     "scene",

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ig2mj.envs.registry import default_config, list_envs, make
     from ig2mj.envs.state import EnvState
     from ig2mj.learn.policies import Policy
+    from ig2mj.plugins import register
     from ig2mj.scene.scene import Scene, load_scene
     from ig2mj.simulation import Simulation
     from ig2mj.tasks.custom.definition import CustomTask, register_task
@@ -42,6 +43,7 @@ __all__ = [
     "load_scene",
     "make",
     "record",
+    "register",
     "register_task",
 ]
 
@@ -62,6 +64,7 @@ _HOME = {
     "load_scene": "ig2mj.scene.scene",
     "make": "ig2mj.envs.registry",
     "record": "ig2mj.demos.environments",
+    "register": "ig2mj.plugins",
     "register_task": "ig2mj.tasks.custom.definition",
 }
 

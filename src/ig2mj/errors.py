@@ -75,6 +75,11 @@ class UnknownNameError(Ig2mjError):
         super().__init__(f"no {kind} is named '{name}'{hint}{also and '; '}{also}")
 
 
+class PluginError(Ig2mjError):
+    """Something from outside the package cannot be used: its code cannot be imported, it is not what is expected, or
+    its name is taken."""
+
+
 class AbilityError(Ig2mjError):
     """A state or predicate was asked of an object whose category does not have it."""
 

@@ -11,7 +11,6 @@ import pytest
 from parsed_commands import parse_only
 
 from ig2mj import cli
-from ig2mj.agents import registry
 from ig2mj.predicates.parse import parse
 from ig2mj.tasks.registry import REGISTERED
 
@@ -118,11 +117,11 @@ def test_every_block_says_what_it_is():
     assert with_python and with_commands
 
 
+@pytest.mark.usefixtures("registered")  # pages register robots and states
 @pytest.mark.parametrize("page", cases(with_python))
 def test_the_python_of_a_page_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(registry, "ROBOTS", dict(registry.ROBOTS))  # pages register robots
-    with unittest.mock.patch.dict(REGISTERED):  # and tasks
+    with unittest.mock.patch.dict(REGISTERED):  # pages register tasks
         run_python(page, without=GPU)
 
 

@@ -12,19 +12,25 @@ import os
 import pathlib
 import pkgutil
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.plugins import Registry, source_of_caller
 
 if TYPE_CHECKING:
     from ig2mj.agents.task_robot import TaskRobot
 
-ROBOTS: dict[str, str | Callable[[], TaskRobot]] = {
+OWN: dict[str, str] = {
     "humanoid": "ig2mj.agents.humanoid:Humanoid",
     "fetch": "ig2mj.agents.fetch:Fetch",
     "turtlebot": "ig2mj.agents.turtlebot:TurtleBot",
 }
-"""By name: a robot's class or a function that makes the robot, or where to import it from ("module:name")."""
+"""Where to import the class of each of ig2mj's robots from ("module:name")."""
+
+ROBOTS: Registry[Any] = Registry(
+    "robot", "a robot's class, or a function without arguments that makes a robot,", callable, OWN, pattern=r"[\w.-]+"
+)
+"""By name: a robot's class or a function that makes the robot; `OWN`, and those of plug-ins."""
 
 
 def register(name: str, make: Callable[[], TaskRobot]) -> None:
@@ -35,13 +41,13 @@ def register(name: str, make: Callable[[], TaskRobot]) -> None:
         `UrdfRobot`.
 
     Raises:
-      EngineError: the name is taken, or `make` cannot be called.
+      EngineError: the name is taken, or `make` cannot be called. PluginError: it is no name.
     """
     if name in ROBOTS:
         raise EngineError(f"robot '{name}' is already registered: choose another name")
     if not callable(make):
         raise EngineError(f"robot '{name}': register its class or a function that makes it, not {make!r}")
-    ROBOTS[name] = make
+    ROBOTS.add(name, make, source_of_caller())
 
 
 def is_robot_folder(value: str | os.PathLike) -> bool:

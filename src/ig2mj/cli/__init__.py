@@ -50,6 +50,8 @@ from typing import Any
 from ig2mj.cli.common.deprecated import new_subcommand
 from ig2mj.errors import Ig2mjError
 from ig2mj.install_hint import pip_install_module
+from ig2mj.plugins import Registry
+from ig2mj.plugins.named_files import name_file
 from ig2mj.process.variables import error_of_variable
 
 #: Sub-command -> what it does, in the order of `ig2mj --help`. The module is `ig2mj.cli.<sub-command>`, a
@@ -79,13 +81,23 @@ COMMANDS: dict[str, str] = {
     "sample-task": "sample an environment's start states and store them in the cache",
     "objects": "list and show the objects that can be added to a home, add libraries of your own",
     "homes": "make a home of your own; list, build, convert and render those that come with ig2mj",
+    "plugins": "list the states, commands and the like that installed packages and files of your own add",
     "doctor": "show what this machine can run, and how to fix what it cannot",
 }
+
+#: Commands of plug-ins: functions as `run` is, or mappings as `SUBCOMMANDS` is.
+ADDED: Registry[Any] = Registry(
+    "command",
+    "a function, or a mapping of functions by name,",
+    lambda thing: callable(thing) or isinstance(thing, Mapping),
+    COMMANDS,
+    pattern="[a-z][a-z0-9-]*",
+)
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as of shells."""
 
-_USAGE = "usage: ig2mj [--debug] [--version] COMMAND ..."
+_USAGE = "usage: ig2mj [--debug] [--plugin FILE.py] [--version] COMMAND ..."
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -104,11 +116,14 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 def call(argv: Sequence[str]) -> int:
-    """Runs one command line and returns its exit status. `--debug`, anywhere in it, lets tracebacks through."""
+    """Runs one command line and returns its exit status.
+
+    Anywhere in it, `--debug` lets tracebacks through, and `--plugin FILE.py` imports a file first.
+    """
     args = [a for a in argv if a != "--debug"]
     debug = len(args) < len(argv)
     try:
-        status = _dispatch(args)
+        status = _dispatch(_without_plugins(args))
         sys.stdout.flush()
         return status
     except SystemExit as e:  # tyro's own exits: 0 after --help, 2 on bad usage
@@ -159,6 +174,22 @@ def _written(error: OSError) -> pathlib.Path | None:
     return None
 
 
+def _without_plugins(args: list[str]) -> list[str]:
+    """The arguments without `--plugin FILE`; the files are imported. Raises Ig2mjError: one is missing or fails."""
+    rest: list[str] = []
+    words = iter(args)
+    for word in words:
+        option, equals, file = word.partition("=")
+        if option != "--plugin":
+            rest.append(word)
+            continue
+        file = file if equals else next(words, "")
+        if not file:
+            raise Ig2mjError("--plugin needs a Python file, or the name of a module, that calls ig2mj.register")
+        name_file(file)
+    return rest
+
+
 def _dispatch(args: list[str]) -> int:
     if not args or args[0] in ("-h", "--help", "help"):
         print(_help())
@@ -170,15 +201,28 @@ def _dispatch(args: list[str]) -> int:
         return 0
     name, rest = args[0], args[1:]
     if name not in COMMANDS:
-        return _unknown("command", name, COMMANDS, "ig2mj --help")
+        if name not in ADDED:
+            return _unknown("command", name, ADDED, "ig2mj --help")
+        added = ADDED[name]
+        return _nested(name, rest, None, added) if isinstance(added, Mapping) else _run(added, f"ig2mj {name}", rest)
     module = importlib.import_module(f"ig2mj.cli.{name.replace('-', '_')}")
     subcommands: Mapping[str, Callable[..., Any]] | None = getattr(module, "SUBCOMMANDS", None)
     if subcommands is None:
         return _run(module.run, f"ig2mj {name}", rest)
+    return _nested(name, rest, module.__doc__, subcommands, getattr(module, "RENAMED", {}))
+
+
+def _nested(
+    name: str,
+    rest: list[str],
+    doc: str | None,
+    subcommands: Mapping[str, Callable[..., Any]],
+    renamed: Mapping[str, str] | None = None,
+) -> int:
     if not rest or rest[0] in ("-h", "--help"):
-        print(_nested_help(name, module.__doc__, subcommands))
+        print(_nested_help(name, doc, subcommands))
         return 0 if rest else 2
-    sub = new_subcommand(name, rest[0], getattr(module, "RENAMED", {}))
+    sub = new_subcommand(name, rest[0], renamed or {})
     if sub not in subcommands and any(arg.lower().endswith(".urdf") for arg in rest):
         words = [f"`ig2mj {name} {known} FILE`" for known in ("object", "robot", "scene") if known in subcommands]
         if words:
@@ -214,14 +258,29 @@ def _help() -> str:
         "commands:",
     ]
     lines += [_entry(name, text) for name, text in COMMANDS.items()]
+    lines += _help_of_plugins()
     lines += ["", "options:"]
     lines += [_entry("--debug", "show the traceback of an error"), _entry("--version", "print the version")]
+    lines += [_entry("--plugin F", "import a Python file that calls ig2mj.register first")]
     lines += [
         "",
         "`ig2mj COMMAND --help` lists a command's options;",
         "`ig2mj doctor` shows what this machine can run.",
     ]
     return "\n".join(lines)
+
+
+def _help_of_plugins() -> list[str]:
+    """Lines of the commands of plug-ins; code of installed packages is not imported for them."""
+    try:
+        sources, plugins = ADDED.sources(), ADDED.plugins()
+        texts = {name: f"{plugins[name].summary} ({source})" for name, source in sources.items() if name in plugins}
+        for name in sources.keys() - texts.keys():
+            doc = "" if isinstance(ADDED[name], Mapping) else (getdoc(ADDED[name]) or "").split("\n", 1)[0]
+            texts[name] = f"{doc} ({sources[name]})"
+    except Ig2mjError as e:
+        return ["", f"commands of plug-ins cannot be listed: {e}"]
+    return ["", "commands of plug-ins:", *(_entry(name, texts[name].strip()) for name in sources)] if sources else []
 
 
 def _entry(name: str, text: str) -> str:

@@ -57,7 +57,7 @@ def run(
         names = [registry.find(s).name for s in state]
     else:
         # Those that every object has fill a table by themselves: poses, boxes, contacts, rooms.
-        names = [s.name for s in registry.SPECS if only or s.abilities is not None]
+        names = [s.name for s in registry.STATES.values() if only or s.abilities is not None]
     world = started(scene, compat, seconds, set, check, added)
     rows: dict[str, dict[str, Any]] = {}
     for name in names:

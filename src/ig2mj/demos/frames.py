@@ -6,7 +6,7 @@ Axes: W worlds, L literals of the goal.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import jax
@@ -21,6 +21,7 @@ from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.plugin_states import plugin_defaults
 
 
 @struct.dataclass
@@ -173,11 +174,29 @@ class Difference:
         return f"{self.run}, frame {self.frame}: {self.field}{at}{of}: {values}"
 
 
+def plugin_columns(initial: ExtendedStates | None, recorded: Collection[str]) -> dict[str, np.ndarray]:
+    """Arrays [1, ...] of plug-ins' states that a recording lacks, as worlds begin with them, by name.
+
+    Args:
+      initial: states of a world at its start. recorded: names of the recording's arrays of the world.
+    """
+    every = {name.replace(".", "/"): rows for name, rows in plugin_defaults(initial, 1).items()}
+    return {name: rows for name, rows in every.items() if name not in recorded}
+
+
 def first_difference(
-    labels: Labels, run: str, frame: int, names: list[str], recorded: list[np.ndarray], found: list[np.ndarray]
+    labels: Labels,
+    run: str,
+    frame: int,
+    names: list[str],
+    recorded: list[np.ndarray],
+    found: list[np.ndarray],
+    left_out: Collection[str] = (),
 ) -> Difference | None:
-    """Of two frames of one world, compared byte by byte; None where they are the same."""
+    """Of two frames of one world, compared byte by byte but for arrays `left_out`; None where they are the same."""
     for name, a, b in zip(names, recorded, found, strict=True):
+        if name in left_out:
+            continue
         if a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes():
             continue
         if a.shape != b.shape:

@@ -33,7 +33,7 @@ from ig2mj.demos.selection import chosen_runs
 from ig2mj.demos.shipped import find_recording
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.predicates.host_queries import HostQueries
-from ig2mj.predicates.registry import PREDICATES, find
+from ig2mj.predicates.registry import OWN, find
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
@@ -216,11 +216,14 @@ def _text(fact: Fact) -> str:
 
 
 def _candidates(model: StateModel, scene: Scene, state: EnvState, world: int) -> dict[str, list[tuple[int, ...]]]:
-    """States of all objects that can have them; contacts and what lies on or in another of what is near it."""
+    """States of all objects that can have them; contacts and what lies on or in another of what is near it.
+
+    Predicates of plug-ins do not count: metrics of a recording are the same everywhere.
+    """
     tables, view = scene.tables, state.batch.world.view
     there = ~tables.object_parked
     asked: dict[str, list[tuple[int, ...]]] = {}
-    for p in PREDICATES.values():
+    for p in OWN.values():
         if p.arity == 1 and p.ability:
             asked[p.name] = [(int(o),) for o in np.flatnonzero(model.parameters.has(p.ability) & there)]
     loose = ~tables.object_fixed & there

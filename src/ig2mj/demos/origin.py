@@ -28,17 +28,25 @@ from ig2mj.demos.writer import FORMAT_VERSION
 from ig2mj.envs.environment import Environment
 from ig2mj.scene.found_again import entries_of
 from ig2mj.scene.scene import Scene
+from ig2mj.states.added import STATES
+from ig2mj.states.added_checks import AddedUpdates
+from ig2mj.states.model import StateModel
 from ig2mj.tasks.task import TaskLike
+from ig2mj.worlds.plugin_states import KEY
 from ig2mj.worlds.pool import Pool
 
 BINDING = (
     *("mujoco", "scene_hash", "model_hash", "task_hash", "robot", "grasping", "engine"),
-    *("horizon", "period", "substeps", "timestep"),
+    *("horizon", "period", "substeps", "timestep", "acting_states"),
 )
 """If one of these differs, a replay by action cannot give the same result."""
 
-LOOSE = ("jax", "architecture", "processor", "processor_features")
-"""If one of these differs, it mostly does: mathematical functions choose their instructions by processor."""
+LOOSE = ("jax", "architecture", "processor", "processor_features", "plugin_states_hash")
+"""If one of these differs, it mostly does: mathematical functions choose their instructions by processor, and plug-ins
+have versions."""
+
+WITHOUT_PLUGINS = {"acting_states": "none"}
+"""Attributes that files lack where no plug-in adds states."""
 
 OBSERVED = ("scene_hash", "model_hash", "task_hash", "robot", "grasping", "horizon", "period")
 """If one of these differs, observations of the same state can differ."""
@@ -73,7 +81,21 @@ def origin_of(env: Environment, version: int = FORMAT_VERSION) -> dict[str, Any]
     code = env.task.code
     if code is not None:
         own |= code.in_files
-    return own | origin_of_scene(env.scene, version) | origin_of_machine()
+    model = None if env.core.rules is None else env.core.rules.model
+    return own | origin_of_states(model) | origin_of_scene(env.scene, version) | origin_of_machine()
+
+
+def origin_of_states(model: StateModel | None) -> dict[str, Any]:
+    """Origin of the states of plug-ins: their fields and where they come from, those that change other states or move
+    objects, and a hash of what they compute. Empty where there are none."""
+    if model is None or not model.added:
+        return {}
+    updates, known = AddedUpdates.of(model), STATES.sources()
+    return {
+        KEY: json.dumps({field: known.get(spec.name, "") for spec in model.added for field in spec.fields}),
+        "acting_states": ", ".join(sorted(updates.acts)) or WITHOUT_PLUGINS["acting_states"],
+        "plugin_states_hash": updates.digest,
+    }
 
 
 def _task_of(env: Environment) -> tuple[TaskLike, str, tuple[str, ...]]:
@@ -117,6 +139,7 @@ def pool_hash(pool: Pool) -> str:
 
 def differences(recorded: Mapping[str, Any], here: Mapping[str, Any], names: tuple[str, ...]) -> list[str]:
     """Attributes that differ, as text with both values. Attributes that the recording lacks are not compared."""
+    recorded, here = {**WITHOUT_PLUGINS, **recorded}, {**WITHOUT_PLUGINS, **here}
     return [
         _difference(name, recorded, here)
         for name in names

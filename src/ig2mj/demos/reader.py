@@ -7,9 +7,11 @@ read at a time. No pickle, no links out of the file.
 from __future__ import annotations
 
 import functools
+import json
 import math
 import os
 import pathlib
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from ig2mj.envs.names import refuse_path
 from ig2mj.errors import InputError
 from ig2mj.files.content import decode_json
 from ig2mj.files.hdf5 import Hdf5File
+from ig2mj.worlds.plugin_states import KEY
 
 FIX = "`ig2mj demos collect`, `ig2mj rollout --record FILE` and `ig2mj.demos.record` write recordings"
 
@@ -78,6 +81,15 @@ class Run:
         """
         index, wanted = self.index(start, stop), like or [None] * len(names)
         return [self._rows(f"frames/{name}", index, like) for name, like in zip(names, wanted, strict=True)]
+
+    def whole_frames(
+        self, names: list[str], start: int, stop: int, like: list[Any], defaults: Mapping[str, np.ndarray]
+    ) -> list[np.ndarray]:
+        """As `frame_rows`; arrays of `defaults`, [1, ...], stand for those that the file lacks. Raises InputError."""
+        there = [k for k, name in enumerate(names) if name not in defaults]
+        found = self.frame_rows([names[k] for k in there], start, stop, [like[k] for k in there])
+        rows = dict(zip(there, found, strict=True))
+        return [rows[k] if k in rows else np.repeat(defaults[n], stop - start, axis=0) for k, n in enumerate(names)]
 
     def rows(self, name: str, start: int, stop: int, like: Any = None) -> np.ndarray:
         """Some rows of one array, [stop - start, ...]; row t of "steps/..." led from frame t to t + 1.
@@ -229,6 +241,18 @@ class Recording:
         if not isinstance(value, kind) or isinstance(value, bool):
             raise InputError(self.file, f"is not of type {kind.__name__}", element=f"attribute {name}", fix=FIX)
         return value
+
+    def missing_states(self, here: Mapping[str, Any]) -> list[str]:
+        """States of plug-ins that the file has, and that an origin of here lacks: a text for each, with its source.
+
+        Raises InputError.
+        """
+        kept = self.value(KEY, dict) if KEY in self.header else {}
+        own = json.loads(str(here.get(KEY, "{}")))
+        lacking = [(field, source) for field, source in kept.items() if field not in own]
+        return [
+            f"the state '{str(field)[:80]}' of {str(source)[:80]} is not registered here" for field, source in lacking
+        ]
 
     def close(self) -> None:
         """May be called twice."""

@@ -28,6 +28,7 @@ from ig2mj.demos.frames import (
     first_difference,
     frame_of,
     names_of,
+    plugin_columns,
     resumed,
     stacked,
 )
@@ -121,7 +122,7 @@ class Replayer:
             binding, loose = tuple(name for name in BINDING if name != "task_hash"), ("task_hash", *LOOSE)
         else:
             binding, loose = BINDING, LOOSE
-        bound = differences(recording.header, here, binding)
+        bound = differences(recording.header, here, binding) + recording.missing_states(here)
         if bound and by == "action":
             raise InputError(
                 recording.file,
@@ -140,10 +141,12 @@ class Replayer:
         self._rows = FrameRows(self.env.core.engine, range(worlds), state).rows
         self._like = self._rows(state)[0]
         self._labels = Labels(self.env.scene)
+        rules, columns = self.env.core.rules, [name.removeprefix("frames/") for name in recording.columns]
+        self._lacking = plugin_columns(None if rules is None else rules.initial, columns)
         for run in recording.runs:
             if run.world >= worlds:
                 raise run.broken("attribute world", f"is {run.world}, and the file is of {worlds} worlds")
-            if run.frames and (missing := [n for n in self._names if n not in run.names]):
+            if run.frames and (missing := [n for n in self._names if n not in (*run.names, *self._lacking)]):
                 raise run.broken(f"frames/{missing[0]}", "is missing")
 
     def __call__(self, check: bool = False, watch: Watch | None = None, runs: Sequence[Run] | None = None) -> Replayed:
@@ -172,7 +175,7 @@ class Replayer:
         Raises:
           InputError: an array of the file is broken.
         """
-        rows = [array[0, ...] for array in run.frame_rows(self._names, frame, frame + 1, self._like)]
+        rows = [array[0, ...] for array in self._read(run, frame, frame + 1)]
         return self._put({run.world: rows if frame else self._start(rows, run)}, {run.world: run}, used)
 
     def rounds(self, runs: Sequence[Run]) -> Iterator[dict[int, Run]]:
@@ -188,7 +191,7 @@ class Replayer:
     def all_at(self, now: dict[int, Run], place: str) -> EnvState:
         """The environment with each run's world at the "first" or "last" of its frames. Raises InputError."""
         frames = {world: 0 if place == "first" else run.frames - 1 for world, run in now.items()}
-        rows = {w: run.frame_rows(self._names, frames[w], frames[w] + 1, self._like) for w, run in now.items()}
+        rows = {w: self._read(run, frames[w], frames[w] + 1) for w, run in now.items()}
         return self._put({w: [array[0, ...] for array in arrays] for w, arrays in rows.items()}, now)
 
     def _by_action(self, now: dict[int, Run], check: bool, watch: Watch | None) -> list[Difference]:
@@ -210,7 +213,8 @@ class Replayer:
                 for world, rows in recorded.items():
                     if rows is None:
                         continue
-                    one = first_difference(self._labels, now[world].name, k, self._names, rows, came[world])
+                    run = now[world].name
+                    one = first_difference(self._labels, run, k, self._names, rows, came[world], self._lacking)
                     if one is not None:
                         found[world] = one
                 if len(found) == len(now):
@@ -251,17 +255,21 @@ class Replayer:
         begun = [now[w].row if w in now else 0 for w in range(self.env.num_worlds)]
         return resumed(self.env, frame, np.clip(begun, 0, size - 1), used)
 
+    def _read(self, run: Run, start: int, stop: int) -> list[np.ndarray]:
+        """Frames of a run, with plug-ins' states that the file lacks as at the start. Raises InputError."""
+        return run.whole_frames(self._names, start, stop, self._like, self._lacking)
+
     def _frames(self, run: Run) -> Iterator[list[np.ndarray] | None]:
         """The arrays of one frame after the other; None where the frame is not in the file."""
         for start in range(0, run.frames, FLUSH):
             stop = min(start + FLUSH, run.frames)
             kept = run.kept(start, stop)
             if kept.all():
-                rows = run.frame_rows(self._names, start, stop, self._like)
+                rows = self._read(run, start, stop)
                 yield from ([array[k, ...] for array in rows] for k in range(stop - start))
                 continue
             for k, there in enumerate(kept, start):
-                yield [a[0, ...] for a in run.frame_rows(self._names, k, k + 1, self._like)] if there else None
+                yield [a[0, ...] for a in self._read(run, k, k + 1)] if there else None
 
     def _actions(self, run: Run) -> Iterator[np.ndarray]:
         like = np.zeros(self.env.action_space.shape, np.float32)

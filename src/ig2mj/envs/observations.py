@@ -22,7 +22,7 @@ from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
 from ig2mj.envs.state import StepContext
-from ig2mj.errors import UnknownNameError
+from ig2mj.errors import PluginError, UnknownNameError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.sensors.base import Memory, Space
 from ig2mj.sensors.registry import SENSORS
@@ -36,9 +36,18 @@ __all__ = ["Observer", "Space", "check_names"]
 
 
 def check_names(names: Sequence[str], objective: Objective) -> list[str]:
-    """The sensors among the names of observations. Raises UnknownNameError, with near matches."""
+    """The sensors among the names of observations.
+
+    Raises:
+      UnknownNameError: there is no such observation; with near matches. PluginError: a sensor of a plug-in has the name
+        of an observation of the task.
+    """
     known = (*objective.vectors, *SENSORS)
+    added = SENSORS.sources()
     for name in names:
+        if name in objective.vectors and name in added:
+            what = f"sensor '{name}' of {added[name]}"
+            raise PluginError(f"{what}: the task has an observation of this name; rename the sensor")
         if name not in known:
             raise UnknownNameError("observation", name, known)
     return [name for name in names if name not in objective.vectors]

@@ -20,6 +20,7 @@ from ig2mj.envs.state import EnvState
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.archive import load_exactly, read_header, save_tree
 from ig2mj.worlds.batch_files import check_fit, check_numbers, layout_of, restored_batch, saved_batch
+from ig2mj.worlds.plugin_states import plugin_defaults, plugin_header, refuse_foreign
 
 if TYPE_CHECKING:
     from ig2mj.envs.environment import Environment
@@ -64,7 +65,8 @@ def save_state(env: Environment, state: EnvState, file: str | os.PathLike) -> No
       StaleStateError: the state is stale. InputError: it cannot be written there.
     """
     env.check(state)
-    save_tree(file, _saved(env, state), {"kind": KIND, "version": FORMAT_VERSION, **_fit(env)})
+    saved = _saved(env, state)
+    save_tree(file, saved, {"kind": KIND, "version": FORMAT_VERSION, **_fit(env), **plugin_header(saved.states)})
 
 
 def load_state(env: Environment, file: str | os.PathLike) -> EnvState:
@@ -73,10 +75,14 @@ def load_state(env: Environment, file: str | os.PathLike) -> EnvState:
     Raises:
       InputError: the file is missing or damaged, or does not fit the environment.
     """
-    check_fit(file, read_header(file), _fit(env), _FIT, (KIND, FORMAT_VERSION), "another environment")
+    header = read_header(file)
+    check_fit(file, header, _fit(env), _FIT, (KIND, FORMAT_VERSION), "another environment")
     like = _saved(env, env.reset(0))
     more = {f"state.info.{FINAL}.{name}": array for name, array in like.state["obs"].items()}
-    saved, extra = load_exactly(file, like, more)
+    refuse_foreign(header, like.states, file)
+    rules = env.core.rules
+    defaults = plugin_defaults(None if rules is None else rules.initial, env.num_worlds)
+    saved, extra = load_exactly(file, like, more, defaults)
     check_numbers(file, env.scene, saved, _observed(env, saved))
     if extra:
         saved.state["info"][FINAL] = {name: extra[f"state.info.{FINAL}.{name}"] for name in like.state["obs"]}

@@ -22,6 +22,7 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query
 from ig2mj.states.relations.relations import Relations
 from ig2mj.states.relations.touching import finite
+from ig2mj.states.spec import Values
 from ig2mj.states.world import ExtendedStates
 
 Arguments = Int[AnyArray, "P K"]
@@ -55,6 +56,7 @@ class Context:
 
 Evaluate = Callable[[Context, Arguments], Bool[Array, "W P"]]
 OfStates = Callable[[StateModel, ExtendedStates], Bool[Array, "W O"]]
+SetTruth = Callable[[StateModel, ExtendedStates, Bool[Array, "#W O"], bool], Values]
 Queries = Callable[[StateModel, Arguments], list[Query]]
 Why = Callable[[Context, tuple[int, ...], int], str]
 
@@ -75,6 +77,8 @@ class Predicate:
         evaluate: truth for argument tuples. ability: without it the first argument's answer is False.
         aliases: other names (iGibson's, BDDL's tokens, the paper's). queries: relations it needs. why: for people, the
         numbers behind the answer in one world. per_object: see `of_states`.
+      set: new fields of the states in which it is true, or false, of the masked objects; of plug-ins' predicates of one
+        object.
     """
 
     name: str
@@ -85,6 +89,7 @@ class Predicate:
     queries: Queries = no_queries
     why: Why | None = None
     per_object: OfStates | None = None
+    set: SetTruth | None = None
 
     @classmethod
     def of_states(cls, of_states: OfStates, **fields: Any) -> Predicate:

@@ -1,8 +1,9 @@
-"""All predicates by name: one line each."""
+"""All predicates by name, one line each, and those of plug-ins."""
 
 from __future__ import annotations
 
 from ig2mj.errors import StateError, UnknownNameError
+from ig2mj.plugins import Registry
 from ig2mj.predicates.base import Predicate
 from ig2mj.predicates.definitions.burnt import BURNT
 from ig2mj.predicates.definitions.cooked import COOKED
@@ -26,7 +27,7 @@ from ig2mj.predicates.definitions.under import UNDER
 from ig2mj.states import registry
 from ig2mj.states.spec import StateSpec
 
-PREDICATES: dict[str, Predicate] = {
+OWN: dict[str, Predicate] = {
     p.name: p
     for p in (
         INSIDE,
@@ -52,7 +53,16 @@ PREDICATES: dict[str, Predicate] = {
 }
 """The 19 predicates of the paper's table A.1, under their snake_case names."""
 
-_ALIASES = {alias: p for p in PREDICATES.values() for alias in p.aliases}
+PREDICATES: Registry[Predicate] = Registry(
+    "predicate",
+    "an ig2mj.predicates.Predicate",
+    lambda thing: isinstance(thing, Predicate),
+    OWN,
+    words=lambda predicate: predicate.aliases,
+)
+"""`OWN`, and those of plug-ins."""
+
+_ALIASES = {alias: p for p in OWN.values() for alias in p.aliases}
 
 
 def find_state(name: str) -> StateSpec:
@@ -66,9 +76,17 @@ def find_state(name: str) -> StateSpec:
 
 
 def find(name: str) -> Predicate:
-    """The predicate of that name or alias, upper and lower case alike. Raises UnknownNameError."""
+    """The predicate of that name or alias, upper and lower case alike.
+
+    Raises:
+      UnknownNameError: there is none. PluginError: it is of a plug-in, which is at fault.
+    """
     key = name.lower()
-    found = PREDICATES.get(key) or _ALIASES.get(key)
+    found = OWN.get(key) or _ALIASES.get(key) or PREDICATES.get(key)
     if found is None:
-        raise UnknownNameError("predicate", name, [*PREDICATES, *_ALIASES])
+        added = PREDICATES.added().values()
+        found = next((predicate for predicate in added if key in predicate.aliases), None)
+        if found is None:
+            aliases = [*_ALIASES, *(alias for predicate in added for alias in predicate.aliases)]
+            raise UnknownNameError("predicate", name, [*PREDICATES, *aliases])
     return found

@@ -43,8 +43,9 @@ While MJX is imported by an engine (`ig2mj.process.imports`):
 
 Environment variables that are read: IG2MJ_CACHE_DIR (moves ig2mj's cache folder, and with it JAX's and Warp's),
 MUJOCO_GL (the backend tried first), IG2MJ_PATCHES and IG2MJ_TRY_KERNELS (which of our functions run in place of MuJoCo
-Warp's), and those named above. MuJoCo Warp's functions are not replaced process-wide: what
-`ig2mj.engine.warp.patches` has in their place runs inside our own engines' programs only.
+Warp's), IG2MJ_PLUGINS (which plug-ins are used, `ig2mj.plugins`), and those named above. MuJoCo Warp's functions are
+not replaced process-wide: what `ig2mj.engine.warp.patches` has in their place runs inside our own engines' programs
+only.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 
-_OURS = ("ig2mj", "ig2mj_converters", "ig2mj_homes", "jaxtyping", "beartype")
+OURS = ("ig2mj", "ig2mj_converters", "ig2mj_homes", "jaxtyping", "beartype")
 """Packages whose frames are not the user's code; the last two wrap functions while tests run."""
 
 
@@ -21,7 +21,7 @@ def warn_renamed(old: str, new: str, owner: str = "") -> None:
       owner: what the name belongs to, e.g. a class.
     """
     level, frame = 2, sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in _OURS:
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in OURS:
         level, frame = level + 1, frame.f_back
     message = f"{owner}: {rename_text(old, new)}" if owner else rename_text(old, new)
     warnings.warn(message, FutureWarning, stacklevel=level)

@@ -15,8 +15,9 @@ from jaxtyping import Bool
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import AbilityError, StateError, UnknownNameError
+from ig2mj.predicates.base import Predicate
 from ig2mj.predicates.literals import object_index
-from ig2mj.predicates.registry import PREDICATES
+from ig2mj.predicates.registry import OWN, PREDICATES
 from ig2mj.predicates.registry import find as find_predicate
 from ig2mj.sampling.surface_particles import sample_places
 from ig2mj.states import particles, registry
@@ -71,7 +72,7 @@ def set_by_name(
 
     Args:
       name: a state that is a number or a switch (`StateSpec.set`), or a predicate: cooked, burnt, frozen, soaked,
-        dusty, stained, toggled_on, open, sliced.
+        dusty, stained, toggled_on, open, sliced, or one of a plug-in (`Predicate.set`).
       object_name: its halves are set alike.
       value: a finite number, or a truth.
       states: given as NumPy arrays, they stay that, and nothing is compiled (but for `sliced`).
@@ -85,9 +86,9 @@ def set_by_name(
     objects = (index, *model.parameters.halves_of(index))
     mask = np.isin(np.arange(model.tables.num_objects), objects)[None]
     task = _Task(model, states, view, object_name, objects, mask, key)
-    if setter := _SETTERS.get(_predicate_name(name)):
-        predicate = PREDICATES[_predicate_name(name)]
-        if predicate.ability not in model.parameters.abilities[index]:
+    predicate = _predicate(name)
+    if predicate is not None and (setter := _SETTERS.get(predicate.name) or _setter_of(predicate)):
+        if predicate.ability is not None and predicate.ability not in model.parameters.abilities[index]:
             raise AbilityError(lacks(f"predicate '{predicate.name}'", object_name, model, (str(predicate.ability),)))
         if value not in (True, False):
             raise StateError(f"predicate '{predicate.name}' is set to true or false, not to {value!r}")
@@ -110,7 +111,8 @@ def set_by_name(
 
 def settable() -> list[str]:
     """Names that `set_by_name` takes."""
-    return [*(s.name for s in registry.SPECS if s.set is not None), *_SETTERS]
+    own = [s.name for s in registry.STATES.values() if s.set is not None]
+    return [*own, *_SETTERS, *(p.name for p in PREDICATES.added().values() if p.set is not None)]
 
 
 def lacks(what: str, object_name: str, model: StateModel, abilities: tuple[str, ...]) -> str:
@@ -119,19 +121,27 @@ def lacks(what: str, object_name: str, model: StateModel, abilities: tuple[str, 
     return f"{what} of '{object_name}': its category '{category}' is not {' or '.join(abilities)}"
 
 
-def _predicate_name(name: str) -> str:
+def _predicate(name: str) -> Predicate | None:
     try:
-        return find_predicate(name).name
+        return find_predicate(name)
     except UnknownNameError:
-        return ""
+        return None
+
+
+def _setter_of(predicate: Predicate) -> Callable[[_Task, bool], Change] | None:
+    """That of a predicate which says itself how it is set."""
+    if (values := predicate.set) is None or predicate.arity != 1:
+        return None
+    return lambda t, value: Change(dataclasses.replace(t.states, **values(t.model, t.states, t.mask, value)))
 
 
 def _state(name: str) -> StateSpec:
     try:
         return registry.find(name)
     except UnknownNameError:
-        if found := _predicate_name(name):
-            raise StateError(f"predicate '{found}' cannot be set by itself: place the object instead") from None
+        if found := _predicate(name):
+            fix = "place the object instead" if found.name in OWN else "its plug-in gives it no `set`"
+            raise StateError(f"predicate '{found.name}' cannot be set by itself: {fix}") from None
         raise UnknownNameError("state or predicate", name, [*registry.STATES, *PREDICATES]) from None
 
 

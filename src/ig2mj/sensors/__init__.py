@@ -1,5 +1,19 @@
 """What agents perceive."""
 
-from ig2mj.process.public_names import offer_modules
+from __future__ import annotations
 
-offer_modules(__name__)
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ig2mj.sensors.base import Percept, Sensor, SensorOptions, Setup, Space
+
+__all__ = ["Percept", "Sensor", "SensorOptions", "Setup", "Space"]
+
+_HOME = dict.fromkeys(__all__, "ig2mj.sensors.base")
+
+
+def __getattr__(name: str) -> Any:
+    """Imports the public names when they are first used."""
+    from ig2mj.process.public_names import public_name
+
+    return public_name("ig2mj.sensors", name, _HOME)

@@ -1,8 +1,9 @@
-"""All sensors, one line each. Names are iGibson's where it has the sensor."""
+"""All sensors, one line each, and those of plug-ins. Names are iGibson's where it has the sensor."""
 
 from __future__ import annotations
 
 from ig2mj.errors import UnknownNameError
+from ig2mj.plugins import Registry
 from ig2mj.sensors.base import Sensor
 from ig2mj.sensors.definitions.bump import BUMP
 from ig2mj.sensors.definitions.colour import RGB
@@ -17,7 +18,7 @@ from ig2mj.sensors.definitions.proprioception import PROPRIOCEPTION
 from ig2mj.sensors.definitions.scan import SCAN
 from ig2mj.sensors.definitions.segmentation import INS_SEG, SEG
 
-SENSORS: dict[str, Sensor] = {
+OWN: dict[str, Sensor] = {
     sensor.name: sensor
     for sensor in (
         RGB,
@@ -39,9 +40,13 @@ SENSORS: dict[str, Sensor] = {
     )
 }
 
+SENSORS: Registry[Sensor] = Registry("sensor", "an ig2mj.sensors.Sensor", lambda thing: isinstance(thing, Sensor), OWN)
+"""`OWN`, and those of plug-ins."""
+
 
 def find_sensor(name: str) -> Sensor:
-    """The sensor of a name. Raises UnknownNameError, with near matches."""
+    """The sensor of a name. Raises UnknownNameError, with near matches; PluginError: it is of a plug-in, which is at
+    fault."""
     if name not in SENSORS:
         raise UnknownNameError("sensor", name, SENSORS)
     return SENSORS[name]

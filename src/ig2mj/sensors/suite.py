@@ -16,15 +16,16 @@ from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Bool, UInt32
 
 from ig2mj.agents.base import Controller
 from ig2mj.engine.base import Engine, Physics
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.errors import EngineError
+from ig2mj.errors import EngineError, PluginError
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
-from ig2mj.sensors.base import Memory, Percept, SensorOptions, Setup, Space
+from ig2mj.sensors.base import Memory, Percept, Sensor, SensorOptions, Setup, Space
 from ig2mj.sensors.images import Camera, Images, Pose
 from ig2mj.sensors.registry import find_sensor
 from ig2mj.states.model import StateModel
@@ -162,7 +163,7 @@ class SensorSuite:
     def feel_fn(self, view: PhysicsView, states: ExtendedStates, controller: Any) -> Readings:
         """Readings of the sensors that need the view only. Pure on every engine, not compiled."""
         percept = Percept(view, states, controller)
-        return {s.name: s.read(self._setup, percept) for s in self._felt}
+        return {s.name: self._read(s, percept) for s in self._felt}
 
     def look_fn(
         self,
@@ -221,7 +222,18 @@ class SensorSuite:
         now = self._memory(view, controller) if self._remembers else None
         before = now if memory is None else memory
         percept = Percept(view, states, controller, eye, images, before, keys)
-        return {s.name: _finite(s.read(self._setup, percept)) for s in self._seen}, now
+        return {s.name: _finite(self._read(s, percept)) for s in self._seen}, now
+
+    def _read(self, sensor: Sensor, percept: Percept) -> Array:
+        """A reading. Raises PluginError: it has another shape or type than the sensor's space."""
+        reading, space = sensor.read(self._setup, percept), self.spaces[sensor.name]
+        shape, dtype = tuple(np.shape(reading)), jnp.result_type(reading)
+        if not shape or shape[1:] != tuple(space.shape) or dtype != space.dtype:
+            wanted = ", ".join(["W", *map(str, space.shape)])
+            raise PluginError(
+                f"sensor '{sensor.name}' gives {dtype}{list(shape)}; its space is {np.dtype(space.dtype)}[{wanted}]"
+            )
+        return reading
 
 
 def _finite(reading: Array) -> Array:

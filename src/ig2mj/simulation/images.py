@@ -30,7 +30,7 @@ def launch_viewer(simulation: Simulation, **options: Any) -> None:
 
     if simulation.state_options is not None:
         shown = [
-            *overlays.default_overlays(simulation.scene),
+            *overlays.default_overlays(simulation.scene, simulation),
             states_overlay.StatesOverlay(simulation, simulation.model),
         ]
         options.setdefault("overlays", shown)

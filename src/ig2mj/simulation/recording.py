@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import jax
 import numpy as np
 
-from ig2mj.demos.frames import Labels, first_difference, names_of
-from ig2mj.demos.origin import LOOSE, differences, origin_of_machine, origin_of_scene
+from ig2mj.demos.frames import Labels, first_difference, names_of, plugin_columns
+from ig2mj.demos.origin import LOOSE, differences, origin_of_machine, origin_of_scene, origin_of_states
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayed
 from ig2mj.demos.writer import FLUSH, FORMAT_VERSION, RunWriter
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 KIND = "simulation"
 
-BINDING = ("mujoco", "scene_hash", "model_hash", "engine", "substeps", "timestep", "grasping")
+BINDING = ("mujoco", "scene_hash", "model_hash", "engine", "substeps", "timestep", "grasping", "acting_states")
 
 
 @entry_point
@@ -148,7 +148,8 @@ def _origin(simulation: Simulation, version: int = FORMAT_VERSION) -> dict[str, 
         "timestep": engine.timestep,
         "grasping": "physical" if grasping is None else grasping.mode,
     }
-    return own | origin_of_scene(simulation.scene, version) | origin_of_machine()
+    model = None if simulation.state_options is None else simulation.state_model
+    return own | origin_of_states(model) | origin_of_scene(simulation.scene, version) | origin_of_machine()
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -160,16 +161,18 @@ def _replayed(simulation: Simulation, recording: Recording) -> Replayed:
     if recording.header.get("kind") != KIND:
         fix = "`ig2mj demos replay FILE` replays it"
         raise InputError(recording.file, "is a recording of an environment, not of a simulation", fix=fix)
-    if bound := differences(recording.header, here, BINDING):
+    if bound := differences(recording.header, here, BINDING) + recording.missing_states(here):
         fix = "replay it in the simulation that it was recorded in"
         raise InputError(recording.file, f"cannot be replayed: {'; '.join(bound)}", fix=fix)
     names, like, labels = _names(simulation), _leaves(simulation), Labels(simulation.scene)
     tree = jax.tree.structure(_world(simulation))
     found, frames, runs = [], 0, [run for run in recording.runs if run.frames]
+    initial = None if simulation.state_options is None else simulation._rules.initial
+    lacking = plugin_columns(initial, [name.removeprefix("frames/") for name in recording.columns])
     for run in runs:
-        if missing := [n for n in names if n not in run.names]:
+        if missing := [n for n in names if n not in (*run.names, *lacking)]:
             raise run.broken(f"frames/{missing[0]}", "is missing")
-        for k, rows in enumerate(_frames(run, names, like)):
+        for k, rows in enumerate(_frames(run, names, like, lacking)):
             frames += 1
             saved = _saved(names, rows, tree)
             if k == 0:
@@ -177,7 +180,7 @@ def _replayed(simulation: Simulation, recording: Recording) -> Replayed:
             else:
                 simulation.robots.controllers = saved.controllers
                 simulation.step(np.asarray(saved.physics.ctrl)[0])
-            difference = first_difference(labels, run.name, k, names, rows, _leaves(simulation))
+            difference = first_difference(labels, run.name, k, names, rows, _leaves(simulation), lacking)
             if difference is not None:
                 found.append(difference)
                 break
@@ -189,8 +192,8 @@ def _saved(names: list[str], rows: list[np.ndarray], tree: Any) -> SavedWorld:
     return jax.tree.unflatten(tree, batched)
 
 
-def _frames(run: Run, names: list[str], like: list[np.ndarray]) -> Any:
+def _frames(run: Run, names: list[str], like: list[np.ndarray], lacking: dict[str, np.ndarray]) -> Any:
     for start in range(0, run.frames, FLUSH):
-        rows = run.frame_rows(names, start, min(start + FLUSH, run.frames), like)
+        rows = run.whole_frames(names, start, min(start + FLUSH, run.frames), like, lacking)
         for k in range(len(rows[0])):
             yield [array[k, ...] for array in rows]

@@ -17,6 +17,7 @@ from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.archive import load_exactly, read_header, save_tree
 from ig2mj.worlds.hands import Held
+from ig2mj.worlds.plugin_states import plugin_defaults, plugin_header, refuse_foreign
 from ig2mj.worlds.pool import check_numbers, check_values
 
 if TYPE_CHECKING:
@@ -63,23 +64,28 @@ def save_world(world: SavedWorld, file: str | os.PathLike, scene: Scene, engine:
         "scene": scene.name,
         "engine": engine,
         "objects": list(scene.object_names),
+        **plugin_header(world.states),
     }
     save_tree(file, jax.tree.map(np.asarray, world), header)
 
 
-def load_world(file: str | os.PathLike, like: SavedWorld, scene: Scene) -> SavedWorld:
-    """Reads a world of the scene; `like`: any world of it, for the shapes.
+def load_world(file: str | os.PathLike, like: SavedWorld, scene: Scene, initial: ExtendedStates) -> SavedWorld:
+    """Reads a world of the scene.
+
+    Args:
+      like: any world of it, for the shapes. initial: its first states, for those of plug-ins that the file lacks.
 
     Raises:
       InputError: the file is missing, broken, of another scene, or of another version; or it holds numbers that no
-        world can have.
+        world can have, or states of plug-ins that are not there.
     """
     header = read_header(file)
     if header.get("version") != VERSION:
         raise InputError(file, f"has version {header.get('version')}, this ig2mj reads {VERSION}")
     if header.get("objects") != list(scene.object_names):
         raise InputError(file, f"is of scene '{header.get('scene')}'", fix="restore it in that scene")
-    found, _ = load_exactly(file, jax.tree.map(np.asarray, like))
+    refuse_foreign(header, like.states, file)
+    found, _ = load_exactly(file, jax.tree.map(np.asarray, like), defaults=plugin_defaults(initial, 1))
     check_values(found.physics, found.states, file)
     trees = {f"physics.{part}.tree_asleep": getattr(found.physics, part).tree_asleep for part in ("scene", "agents")}
     bodies = {f"states.{name}.body": getattr(found.states, name).body for name in ("dust", "stain")}

@@ -47,6 +47,7 @@ from ig2mj.states.model import DEFAULTS, StateModel
 from ig2mj.states.options import StateOptions
 from ig2mj.states.world import ExtendedStates, WorldState
 from ig2mj.worlds.core import Core
+from ig2mj.worlds.plugin_states import completed
 from ig2mj.worlds.rules import Rules
 from ig2mj.worlds.worlds import controllers_of, grasping_of
 
@@ -125,7 +126,7 @@ class Simulation(Recorded):
         simulation = cls(scene, **options)
         simulation.physics = simulation.engine.load(simulation.physics, snapshot)
         simulation._initial = simulation.engine.export(simulation.physics, 0)
-        simulation._states = states
+        simulation._states = states if states is None else completed(states, simulation._rules.initial)
         return simulation
 
     @property
@@ -421,7 +422,7 @@ class Simulation(Recorded):
 
     def load(self, path: str | os.PathLike) -> PhysicsView:
         """Goes back to a world that `save` wrote, of this scene. Raises InputError."""
-        return put_world(self, load_world(path, everything(self), self.scene))
+        return put_world(self, load_world(path, everything(self), self.scene, self._rules.initial))
 
     def restore(self, path: str | os.PathLike) -> PhysicsView:
         """Deprecated: `load`."""

@@ -9,16 +9,20 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.options import StateOptions
 from ig2mj.states.relations.plan import PlannedRelations, RelationPlan
 from ig2mj.states.relations.relations import Relations
+from ig2mj.states.spec import EventStep, HeatStep, StateSpec
 from ig2mj.states.update import queries, update
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 
 __all__ = [
+    "EventStep",
     "ExtendedStates",
+    "HeatStep",
     "PlannedRelations",
     "RelationPlan",
     "Relations",
     "StateModel",
     "StateOptions",
+    "StateSpec",
     "Swap",
     "WorldState",
     "initial_states",

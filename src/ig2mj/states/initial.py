@@ -14,7 +14,7 @@ from ig2mj.scene.manifest import Manifest
 from ig2mj.states.model import StateModel
 from ig2mj.states.registry import SPECS
 from ig2mj.states.spec import Saved
-from ig2mj.states.world import ExtendedStates
+from ig2mj.states.world import ExtendedStates, states_class
 
 NUMBERS = ("temperature", "max_temperature", "wetness", "toggled_on", "sliced")
 """Keys of a manifest that are one number per object, and the fields of the same names."""
@@ -32,13 +32,13 @@ def initial_states(model: StateModel, num_worlds: int) -> ExtendedStates:
 def _one_world(model: StateModel) -> ExtendedStates:
     """NumPy arrays."""
     values: dict[str, Any] = {}
-    for spec in SPECS:
+    for spec in (*SPECS, *model.added):
         if spec.initial is not None:
             found = spec.initial(model)
             if set(found) != set(spec.fields):
                 raise ValueError(f"state '{spec.name}' has fields {sorted(spec.fields)} but starts {sorted(found)}")
             values.update(found)
-    return ExtendedStates(**values)
+    return states_class(model.added)(**values)
 
 
 @functools.partial(jax.jit, static_argnums=1)
@@ -61,7 +61,7 @@ def states_of_manifest(
     # Filled in on the host, one world, then repeated.
     states = _one_world(model)
     for obj, entry in enumerate(manifest.objects):
-        for spec in SPECS:
+        for spec in (*SPECS, *model.added):
             if spec.from_manifest is not None:
                 spec.from_manifest(Saved(model, states, obj, entry.state, bodies))
     return jax.device_put(jax.tree.map(lambda leaf: np.repeat(leaf, num_worlds, axis=0), states))

@@ -10,19 +10,26 @@ from jaxtyping import Int
 
 from ig2mj.scene.manifest import Manifest
 from ig2mj.scene.tables import LinkKind, SceneTables
+from ig2mj.states.added import added_states
 from ig2mj.states.options import StateOptions
 from ig2mj.states.parameters import StateParameters, parameters_of_manifest
+from ig2mj.states.spec import StateSpec
 
 DEFAULTS = StateOptions()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StateModel:
-    """Constants of a scene's states: tables, parameters, options."""
+    """Constants of a scene's states: tables, parameters, options, and the states of plug-ins that it has.
+
+    Attributes:
+      added: states of plug-ins, in the order of their updates; by default all that are known now.
+    """
 
     tables: SceneTables
     parameters: StateParameters
     options: StateOptions = DEFAULTS
+    added: tuple[StateSpec, ...] = dataclasses.field(default_factory=added_states)
 
     @classmethod
     def of_manifest(cls, tables: SceneTables, manifest: Manifest, options: StateOptions = DEFAULTS) -> StateModel:

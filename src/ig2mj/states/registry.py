@@ -1,4 +1,4 @@
-"""All object states, one line each, and by name.
+"""All object states of ig2mj, one line each, and all states by name.
 
 Names are those of `ig2mj.knowledge`; the paper's (table A.4) and iGibson's class names, in snake_case, are aliases.
 """
@@ -6,6 +6,7 @@ Names are those of `ig2mj.knowledge`; the paper's (table A.4) and iGibson's clas
 from __future__ import annotations
 
 from ig2mj.errors import UnknownNameError
+from ig2mj.states.added import STATES
 from ig2mj.states.definitions import from_physics, heat_source, open
 from ig2mj.states.spec import StateSpec
 from ig2mj.states.update import EVENTS, HEAT
@@ -25,16 +26,21 @@ SPECS: tuple[StateSpec, ...] = (
     from_physics.ROOMS,
 )
 """Every state of table A.4, and iGibson's others that can be asked. What keeps something has its line in the order of
-update (`ig2mj.states.update`)."""
+update (`ig2mj.states.update`). States of plug-ins are in `STATES` only."""
 
-STATES: dict[str, StateSpec] = {s.name: s for s in SPECS}
+STATES.ship({s.name: s for s in SPECS})
 
 _ALIASES = {alias: s for s in SPECS for alias in s.aliases}
 
 
 def find(name: str) -> StateSpec:
-    """The state of that name or alias. Raises UnknownNameError."""
-    found = STATES.get(name.lower()) or _ALIASES.get(name.lower())
+    """The state of that name or alias. Raises UnknownNameError; PluginError: it is of a plug-in, which is at fault."""
+    key = name.lower()
+    found = STATES.get(key) or _ALIASES.get(key)
     if found is None:
-        raise UnknownNameError("state", name, [*STATES, *_ALIASES])
+        added = STATES.added().values()
+        found = next((spec for spec in added if key in spec.aliases), None)
+        if found is None:
+            aliases = [*_ALIASES, *(alias for spec in added for alias in spec.aliases)]
+            raise UnknownNameError("state", name, [*STATES, *aliases])
     return found

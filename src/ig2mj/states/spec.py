@@ -1,8 +1,8 @@
 """`StateSpec`: everything there is to know about one extended state, in one place; the state's own file holds it.
 
-`registry.SPECS` lists them. All else is derived: the arrays of `ExtendedStates`, what they are at the start and what a
-manifest says of them, what halves inherit at a cut, what can be asked and set by name, what is saved. `update.EVENTS`
-and `update.HEAT` are the order in which those that change by themselves are updated.
+`registry.SPECS` lists ig2mj's own. All else is derived: the arrays of `ExtendedStates`, what they are at the start and
+what a manifest says of them, what halves inherit at a cut, what can be asked and set by name, what is saved.
+`update.EVENTS` and `update.HEAT` are the order in which those that change by themselves are updated.
 
 Axes: W worlds, O objects, S heat sources.
 """
@@ -10,18 +10,21 @@ Axes: W worlds, O objects, S heat sources.
 from __future__ import annotations
 
 import dataclasses
+import typing
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.states.model import StateModel
 from ig2mj.states.swap import Swap
 
 if TYPE_CHECKING:
+    from ig2mj.states.model import StateModel
+    from ig2mj.states.relations.plan import Query
+    from ig2mj.states.relations.relations import Relations
     from ig2mj.states.world import ExtendedStates
 
 Values = Mapping[str, Any]
@@ -69,7 +72,8 @@ class EventStep:
 
     Attributes:
       states: as the updates so far have left them. view: physics after the step. drops: how many touched each soakable
-      object. cut_now: objects that were cut. swap: teleports that follow.
+      object. cut_now: objects that were cut. swap: teleports that follow. relations: answers for `view` to what
+      `StateSpec.queries` ask.
     """
 
     model: StateModel
@@ -78,13 +82,14 @@ class EventStep:
     drops: Int[Array, "W O"]
     cut_now: Bool[Array, "W O"]
     swap: Swap
+    relations: Relations
 
     @classmethod
-    def start(cls, model: StateModel, states: ExtendedStates, view: PhysicsView) -> EventStep:
+    def start(cls, model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations) -> EventStep:
         """The step before anything has happened."""
         shape, moved = states.temperature.shape, (states.temperature.shape[0], len(model.swap_objects))
         still = Swap(jnp.zeros(moved, bool), jnp.zeros((*moved, 3)), jnp.zeros((*moved, 4)))
-        return cls(model, states, view, jnp.zeros(shape, jnp.int32), jnp.zeros(shape, bool), still)
+        return cls(model, states, view, jnp.zeros(shape, jnp.int32), jnp.zeros(shape, bool), still, relations)
 
     def having(self, **fields: Any) -> EventStep:
         """The step with other values in some fields of the states."""
@@ -96,13 +101,14 @@ class HeatStep:
     """A control step on its way through `update.HEAT`, after the events.
 
     Attributes:
-      acts: heat source on object. touching: read only where heat passes by contact. in_use: false for parked objects.
+      acts: heat source on object. view: physics after the step, in which halves that come into the world in this step
+      are still parked. in_use: false for parked objects.
     """
 
     model: StateModel
     states: ExtendedStates
     acts: Bool[Array, "W O S"]
-    touching: Bool[Array, "W O O"]
+    view: PhysicsView
     in_use: Bool[Array, "W O"]
 
     def having(self, **fields: Any) -> HeatStep:
@@ -110,8 +116,11 @@ class HeatStep:
         return dataclasses.replace(self, states=dataclasses.replace(self.states, **fields))
 
 
-Get = Callable[[StateModel, "ExtendedStates", PhysicsView, int, int], Any]
-Initial = Callable[[StateModel], Values]
+Part = Literal["events", "heat"]
+
+Get = Callable[["StateModel", "ExtendedStates", PhysicsView, int, int], Any]
+Initial = Callable[["StateModel"], Values]
+Queries = Callable[["StateModel"], "list[Query]"]
 Inherit = Callable[["ExtendedStates", Cut], Values]
 Set = Callable[["ExtendedStates", Bool[Array, "#W O"], Any], Values]
 Update = Callable[[Any], Any]
@@ -147,9 +156,12 @@ class StateSpec:
       inherit: its fields after halves took over what their wholes had, from (states, `Cut`); `nothing_inherited`.
       from_manifest: writes what a manifest says of one object into `Saved.states`; `nothing_saved`.
       set: new fields from (states, mask of objects, number or switch); None: cannot be set by name.
+      part: of the step in which `update` runs. "events": after switches, cuts, water and dirt, with an `EventStep`, in
+        which temperatures are those of the step before. "heat": after the temperatures, with a `HeatStep`.
+      queries: relations between objects that `update` reads (`EventStep.relations`), as of `RelationPlan.build`.
 
     Raises:
-      ValueError: a piece is missing, or there is one too many.
+      ValueError: a piece is missing, or there is one too many; `part` is neither.
     """
 
     name: str
@@ -163,8 +175,14 @@ class StateSpec:
     inherit: Inherit | None = None
     from_manifest: Callable[[Saved], None] | None = None
     set: Set | None = None
+    part: str = "events"
+    queries: Queries | None = None
 
     def __post_init__(self):
+        if self.part not in typing.get_args(Part):
+            raise ValueError(f"state '{self.name}' is of part {self.part!r}, and parts are 'events' and 'heat'")
+        if self.queries is not None and (self.part == "heat" or self.update is None):
+            raise ValueError(f"state '{self.name}' has queries, which only an update of the part 'events' can read")
         missing = [piece for piece in KEEPS if getattr(self, piece) is None]
         if self.fields and missing:
             raise ValueError(f"state '{self.name}' keeps {', '.join(self.fields)} but lacks {', '.join(missing)}")

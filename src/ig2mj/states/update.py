@@ -3,6 +3,8 @@
 A state that depends on another reads this step's value of it, except for water: a tap that is switched on in this step
 releases the first drop in the next one, as in iGibson. Between the two parts it is found which heat source acts on
 what; a caller that knows that nothing else has changed since the last step may run `heat` alone.
+
+States of plug-ins (`StateModel.added`) come after ig2mj's own in the part that they name.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from ig2mj.states.definitions import (
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query, RelationPlan
 from ig2mj.states.relations.relations import Relations
-from ig2mj.states.spec import EventStep, HeatStep, StateSpec
+from ig2mj.states.spec import EventStep, HeatStep, Part, StateSpec
 from ig2mj.states.swap import Swap
 
 if TYPE_CHECKING:
@@ -52,13 +54,21 @@ HEAT: tuple[StateSpec, ...] = (
 )
 """The second part of a step."""
 
-HEAT_FIELDS = tuple(name for spec in HEAT for name in spec.fields)
-"""What the second part changes."""
-
 
 def queries(model: StateModel) -> list[Query]:
     """The relations between objects that an update needs."""
-    return heat_source.queries(model)
+    added = [query for spec in model.added if spec.queries is not None for query in spec.queries(model)]
+    return [*heat_source.queries(model), *added]
+
+
+def heat_fields(model: StateModel) -> tuple[str, ...]:
+    """What the second part changes."""
+    return tuple(name for spec in (*HEAT, *_added(model, "heat")) for name in spec.fields)
+
+
+def _added(model: StateModel, part: Part) -> tuple[StateSpec, ...]:
+    """States of plug-ins that are updated in this part."""
+    return tuple(spec for spec in model.added if spec.part == part and spec.update is not None)
 
 
 @entry_point
@@ -79,7 +89,7 @@ def update(
     if relations is None:
         relations = RelationPlan.build(model, queries(model)).evaluate(view)
     states, swap, acts = events(model, states, view, relations)
-    return heat(model, states, acts, view.touching), swap
+    return heat(model, states, acts, view), swap
 
 
 @entry_point
@@ -90,8 +100,8 @@ def events(
 
     It reads no temperature (but slicing copies them); with the same view and the same other states it does the same.
     """
-    step = EventStep.start(model, states, view)
-    for spec in EVENTS:
+    step = EventStep.start(model, states, view, relations)
+    for spec in (*EVENTS, *_added(model, "events")):
         assert spec.update is not None
         step = spec.update(step)
     opened = open.is_open(model, view.joint_pos)
@@ -101,16 +111,14 @@ def events(
 
 
 @entry_point
-def heat(
-    model: StateModel, states: ExtendedStates, acts: Bool[Array, "W O S"], touching: Bool[Array, "W O O"]
-) -> ExtendedStates:
+def heat(model: StateModel, states: ExtendedStates, acts: Bool[Array, "W O S"], view: PhysicsView) -> ExtendedStates:
     """The second part of a step: temperatures and what follows from them.
 
     Args:
-      acts: from `events`. touching: read only where heat passes by contact.
+      acts: from `events`. view: of ig2mj's own states, only heat that passes by contact reads it.
     """
-    step = HeatStep(model, states, acts, touching, sliced.in_use(model, states.sliced))
-    for spec in HEAT:
+    step = HeatStep(model, states, acts, view, sliced.in_use(model, states.sliced))
+    for spec in (*HEAT, *_added(model, "heat")):
         assert spec.update is not None
         step = spec.update(step)
     return step.states

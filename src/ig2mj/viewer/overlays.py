@@ -1,19 +1,21 @@
 """What can be written over the image of the interactive viewer: object names, rooms, the clock.
 
 An overlay is anything with a `title` and the methods `labels` (texts that hang at points of the world) and `lines`
-(rows of two texts in a corner of the window). The viewer asks every overlay that is on once per frame. A new
-one, say for states, is a class like those below, handed to `interactive.open_viewer(..., overlays=[...])`.
+(rows of two texts in a corner of the window). The viewer asks every overlay that is on once per frame. A new one is a
+class like those below, handed to `interactive.open_viewer(..., overlays=[...])` or registered (`ig2mj.register`).
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
 
+from ig2mj.errors import PluginError
+from ig2mj.plugins import Registry
 from ig2mj.scene.scene import Scene
 
 
@@ -109,10 +111,32 @@ class Clock:
         return [("time", f"{data.time:.1f} s"), ("awake", f"{awake} of {self._trees}"), ("contacts", str(data.ncon))]
 
 
-def default_overlays(scene: Scene) -> list[Overlay]:
-    """Those that the viewer can show, one line each."""
+OVERLAYS: Registry[Callable[..., Overlay]] = Registry(
+    "overlay", "a class or function that makes an ig2mj.viewer.overlays.Overlay of a scene and a world,", callable
+)
+"""Overlays of plug-ins. Each is called with the scene and with what `default_overlays` got as `world`."""
+
+
+def default_overlays(scene: Scene, world: Any = None) -> list[Overlay]:
+    """Those that the viewer can show, one line each, and those of plug-ins.
+
+    Args:
+      world: what overlays of plug-ins may read states from, an `ig2mj.Simulation`; None: only the scene is shown.
+
+    Raises:
+      PluginError: one cannot be imported, or makes no overlay.
+    """
     return [
         ObjectNames(scene),
         RoomNames(scene),
         Clock(scene),
+        *(_added(name, scene, world) for name in OVERLAYS),
     ]
+
+
+def _added(name: str, scene: Scene, world: Any) -> Overlay:
+    overlay = OVERLAYS[name](scene, world)
+    if not isinstance(overlay, Overlay):
+        source = OVERLAYS.sources()[name]
+        raise PluginError(f"overlay '{name}' of {source} is {overlay!r:.80}: it needs title, labels and lines")
+    return overlay

@@ -32,7 +32,7 @@ GOOD, BAD, SOFT = "#1b7f3b", "#b3261e", "#6b7280"
 def object_rows(model: StateModel, shot: Shot, index: int) -> list[tuple[str, str]]:
     """Name and value of every state of an object, then its predicates that are true or false by states alone."""
     rows: list[tuple[str, str]] = []
-    for spec in (*(s for s in SPECS if s not in (*_SLOW, *_LONG)), *_LONG):
+    for spec in (*(s for s in SPECS if s not in (*_SLOW, *_LONG)), *model.added, *_LONG):
         if spec.belongs_to(model, index):
             value = _text(spec.get(model, shot.states, shot.view, index, shot.row))
             rows.append((spec.name.replace("_", " "), f"{value} {spec.unit}".strip() if value != "-" else value))

@@ -83,12 +83,16 @@ def load_tree(file: str | os.PathLike, like: Tree, rows: str = "") -> tuple[Tree
 
 
 def load_exactly(
-    file: str | os.PathLike, like: Tree, optional: Mapping[str, Any] | None = None
+    file: str | os.PathLike,
+    like: Tree,
+    optional: Mapping[str, Any] | None = None,
+    defaults: Mapping[str, np.ndarray] | None = None,
 ) -> tuple[Tree, dict[str, np.ndarray]]:
     """Reads a pytree of exactly the structure, shapes and dtypes of `like`; nothing else in the file is unpacked.
 
     Args:
       optional: arrays by path, with examples of their shapes and dtypes, that may be missing, all or none.
+      defaults: arrays of `like` that the file may lack, by path.
 
     Returns:
       The pytree, and the optional arrays that are there.
@@ -102,6 +106,8 @@ def load_exactly(
     there = optional if any(name in arrays for name in optional) else {}
     found = {}
     for name, example in {**wanted, **there}.items():
+        if name not in arrays and name in (defaults or {}):
+            arrays[name] = (defaults or {})[name]
         if name not in arrays:
             raise InputError(file, "is missing", element=name, fix="make the file again with this version")
         array, shape = arrays[name], np.shape(example)

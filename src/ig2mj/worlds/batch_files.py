@@ -28,6 +28,7 @@ from ig2mj.worlds.archive import load_exactly, read_header, save_tree
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.guards import Flag
+from ig2mj.worlds.plugin_states import plugin_defaults, plugin_header, refuse_foreign
 
 KIND = "batch of worlds"
 
@@ -79,17 +80,27 @@ def save_parts(core: Core, parts: Sequence[Batch], file: str | os.PathLike) -> N
         core.check(part)
     saved = [saved_batch(core, part) for part in parts]
     whole = jax.tree.map(lambda *arrays: _joined([np.asarray(array) for array in arrays]), *saved)
-    header = {"kind": KIND, "version": FORMAT_VERSION, **_fit(core, len(parts))}
+    header = {"kind": KIND, "version": FORMAT_VERSION, **_fit(core, len(parts)), **plugin_header(whole.states)}
     save_tree(file, whole, header)
 
 
 def load_parts(core: Core, count: int, file: str | os.PathLike) -> list[SavedBatch]:
     """Reads the worlds of `count` batches of the core. Raises InputError."""
-    check_fit(file, read_header(file), _fit(core, count), FIXES)
+    header = read_header(file)
+    check_fit(file, header, _fit(core, count), FIXES)
     like = saved_batch(core, core.start(0))
-    whole, _ = load_exactly(file, jax.tree.map(lambda array: _joined([np.asarray(array)] * count), like))
+    refuse_foreign(header, like.states, file)
+    defaults = plugin_defaults(_initial(core), core.engine.num_worlds * count)
+    whole, _ = load_exactly(
+        file, jax.tree.map(lambda array: _joined([np.asarray(array)] * count), like), defaults=defaults
+    )
     check_numbers(file, core.engine.scene, whole)
     return [jax.tree.map(lambda array, k=k: _part(array, k, count), whole) for k in range(count)]
+
+
+def _initial(core: Core) -> Any:
+    """States of a world at its start; None where only physics is stepped."""
+    return None if core.rules is None else core.rules.initial
 
 
 def _joined(arrays: list[np.ndarray]) -> np.ndarray:

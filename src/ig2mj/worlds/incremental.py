@@ -16,6 +16,9 @@ engines, with the states and the view of each control step. Three facts decide w
   the same, unless the states or the goal read what differs. Fingers count as the same while all are out of reach of all
   buttons.
 
+Updates of plug-ins' states are traced (`ig2mj.states.added_checks`). Where one reads temperatures in the first part, or
+changes other states in the second, every step is a whole one.
+
 Axes: W worlds, O objects, S heat sources, L literals.
 """
 
@@ -36,11 +39,12 @@ from ig2mj.engine.view import Array, PhysicsView, but_agents
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.registry import find
+from ig2mj.states.added_checks import AddedUpdates
 from ig2mj.states.definitions import toggled_on
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
-from ig2mj.states.update import HEAT_FIELDS, events, heat, queries
+from ig2mj.states.update import events, heat, heat_fields, queries
 from ig2mj.states.world import ExtendedStates, Swap
 from ig2mj.worlds.rules import Outcome, Rules
 
@@ -71,7 +75,7 @@ class IncrementalRules:
         Args:
           enabled: the switch; False: each step is a whole one.
         """
-        self._enabled = enabled
+        self._enabled = enabled and not AddedUpdates.of(rules.model).whole
         self._programs, self._goal = _StatePrograms.of(rules.model, num_worlds), _Goal.of(rules.goal, num_worlds)
         self._last: Outcome | None = None
         self._acts: Array | None = None  # of the last whole step; None: the next step is a whole one
@@ -126,6 +130,8 @@ class IncrementalRules:
             return False
         if self._programs.agent_reads:
             model = self._programs.model
+            if self._programs.fingers_matter:
+                return False
             if self._fingers_away is None:
                 self._fingers_away = toggled_on.all_out_of_reach(model, self._view)
             if not self._fingers_away or not toggled_on.all_out_of_reach(model, view):
@@ -158,6 +164,8 @@ class _StatePrograms:
 
     def __init__(self, model: StateModel, num_worlds: int):
         self.model, self._plan = model, RelationPlan.build(model, queries(model))
+        self._heat_fields = heat_fields(model)
+        self.fingers_matter = FINGERS in AddedUpdates.of(model).reads  # also where they are out of reach of buttons
         self._step, self._heat = HostFunction(self._rules_fn), HostFunction(self._heat_fn)
         self._changed: list[int] = []  # leaves of the states that a step can change; known once it was traced
 
@@ -186,12 +194,12 @@ class _StatePrograms:
         states, and the names of those that it changed."""
         made, same = self._heat(view, states, acts)
         for k, kept in enumerate(same.tolist()):
-            changed = [name for name, is_same in zip(HEAT_FIELDS, kept, strict=True) if not is_same]
-            yield {name: steps[k] for name, steps in zip(HEAT_FIELDS, made, strict=True)}, changed
+            changed = [name for name, is_same in zip(self._heat_fields, kept, strict=True) if not is_same]
+            yield {name: _row(steps, k) for name, steps in zip(self._heat_fields, made, strict=True)}, changed
 
     def _rules_fn(self, view: PhysicsView, states: ExtendedStates) -> tuple[Any, ...]:
         after, swap, acts = events(self.model, states, view, self._plan.evaluate(view))
-        new = heat(self.model, after, acts, view.touching)
+        new = heat(self.model, after, acts, view)
         quiet, same = _are_same(states, after), _are_same(after, new)
         before, made = jax.tree.leaves(states), jax.tree.leaves(new)
         self._changed = [i for i, leaf in enumerate(made) if leaf is not before[i]]
@@ -199,18 +207,26 @@ class _StatePrograms:
         return [made[i] for i in self._changed], (swap.mask, swap.pos, swap.quat), acts, flags
 
     def _heat_fn(self, view: PhysicsView, states: ExtendedStates, acts: Array) -> tuple[list[Any], Array]:
-        def step(before: list[Array], _: None) -> tuple[list[Array], tuple[list[Array], Array]]:
-            now = states.replace(**dict(zip(HEAT_FIELDS, before, strict=True)))
-            new = heat(self.model, now, acts, view.touching)
-            after: list[Array] = [getattr(new, name) for name in HEAT_FIELDS]
-            same = jnp.stack([jnp.all(a == b) for a, b in zip(before, after, strict=True)])
+        names = self._heat_fields
+
+        def step(before: list[Any], _: None) -> tuple[list[Any], tuple[list[Any], Array]]:
+            now = states.replace(**dict(zip(names, before, strict=True)))
+            new = heat(self.model, now, acts, view)
+            after = [getattr(new, name) for name in names]
+            same = jnp.stack([_are_same(a, b) for a, b in zip(before, after, strict=True)])
             return after, (after, same)
 
-        return jax.lax.scan(step, [jnp.asarray(getattr(states, name)) for name in HEAT_FIELDS], None, AHEAD)[1]
+        start = [jax.tree.map(jnp.asarray, getattr(states, name)) for name in names]
+        return jax.lax.scan(step, start, None, AHEAD)[1]
 
 
-def _are_same(one: ExtendedStates, other: ExtendedStates) -> Bool[Array, ""]:
-    """Whether all numbers of two states are equal; arrays that are one object are not compared."""
+def _row(tree: Any, k: int) -> Any:
+    """One step of a field, which is an array or a pytree of arrays."""
+    return tree[k] if isinstance(tree, np.ndarray | jax.Array) else jax.tree.map(lambda leaf: leaf[k], tree)
+
+
+def _are_same(one: Any, other: Any) -> Bool[Array, ""]:
+    """Whether all numbers of two pytrees are equal; arrays that are one object are not compared."""
     leaves = zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True)
     return jnp.all(jnp.array([True, *(jnp.all(a == b) for a, b in leaves if a is not b)]))
 
@@ -261,10 +277,11 @@ class _Goal:
             return frozenset()
         if self._questions is not None:
             reads = (self._questions.reads(find(name)) for name in self._goal.literals.instances)
-            return frozenset(name for names in reads for name in HEAT_FIELDS if f"states.{name}" in names)
+            read = {name.split(".")[1] for names in reads for name in names if name.startswith("states.")}
+            return frozenset(heat_fields(self._goal.model)).intersection(read)
         paths, _ = jax.tree_util.tree_flatten_with_path(initial_states(self._goal.model, 1))
         names = [path[0].name for path, _ in paths]  # leaf 0 of the arguments is the view
-        return frozenset(names[leaf - 1] for leaf in self._status.takes).intersection(HEAT_FIELDS)
+        return frozenset(names[leaf - 1] for leaf in self._status.takes).intersection(heat_fields(self._goal.model))
 
     def _status_fn(self, view: PhysicsView, states: ExtendedStates) -> tuple[Array, Array, Array]:
         assert self._goal is not None

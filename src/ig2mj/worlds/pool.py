@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -29,8 +30,9 @@ from ig2mj.scene.paths import shipped_homes
 from ig2mj.scene.scene import Agent, Scene, load_scene
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
-from ig2mj.states.world import ExtendedStates
+from ig2mj.states.world import ExtendedStates, added_fields
 from ig2mj.worlds.archive import build, check_array, check_finite, name_of, read_arrays, read_header, save_tree
+from ig2mj.worlds.plugin_states import foreign_fields, plugin_defaults, plugin_header
 
 FORMAT_VERSION = 2
 """1: scene and agents were not separate (`ig2mj.engine.snapshot`)."""
@@ -80,6 +82,7 @@ def save_pool(pool: Pool, file: str | os.PathLike, scene: Scene, note: dict[str,
         "digest": scene.digest,
         "additions": entries_of(scene.additions),
         "changes": [change.text for change in scene.changes],
+        **plugin_header(pool.states),
     }
     save_tree(file, pool, {**header, **(note or {})})
 
@@ -138,9 +141,11 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
     lengths = {len(array) if array.ndim else 0 for array in arrays.values()}
     if len(lengths) != 1:
         raise InputError(file, f"has arrays of different lengths: {', '.join(map(str, sorted(lengths)))}", fix=fix)
+    initial = None
     if scene is not None:
-        _check_widths(arrays, scene, file)
-    pool = build(Pool, arrays, file)
+        initial = initial_states(StateModel.of_manifest(scene.tables, scene.manifest), 1)
+        _check_widths(arrays, scene, initial, file)
+    pool = _built(arrays, header, initial, file)
     if not pool.size:
         raise InputError(file, "has no rows", fix=fix)
     check_values(pool.physics, pool.states, file)
@@ -166,7 +171,26 @@ def check_numbers(arrays: Mapping[str, np.ndarray], counts: Mapping[str, int], f
             raise InputError(file, f"names number {int(arrays[name].max())} of {count}", element=name, fix=_FIX)
 
 
-def _check_widths(arrays: Mapping[str, np.ndarray], scene: Scene, file: str | os.PathLike) -> None:
+def _built(
+    arrays: Mapping[str, np.ndarray], header: Mapping[str, Any], initial: ExtendedStates | None, file: str | os.PathLike
+) -> Pool:
+    """The pool of a file's arrays, with states of plug-ins that it lacks as in `initial`. Raises InputError.
+
+    Values of other states of plug-ins are left out, with a warning: nothing that reads them is there.
+    """
+    pool = build(Pool, arrays, file)
+    if initial is not None and added_fields(initial):
+        lacking = {name: rows for name, rows in plugin_defaults(initial, pool.size).items() if name not in arrays}
+        pool = dataclasses.replace(pool, states=build(type(initial), {**arrays, **lacking}, file, "states."))
+    if foreign := foreign_fields(header, pool.states):
+        named = ", ".join(f"'{field}' of {source}" for field, source in foreign.items())
+        warnings.warn(f"{file}: states of plug-ins that are not here are left out: {named}", stacklevel=3)
+    return pool
+
+
+def _check_widths(
+    arrays: Mapping[str, np.ndarray], scene: Scene, states: ExtendedStates, file: str | os.PathLike
+) -> None:
     """Refuses arrays of other kinds and widths than the scene's, and numbers of trees and bodies that it has not."""
     layout = make_layout(scene.model, scene.tables)
     units, sizes = layout.num_object_units, dict(layout.scene_sizes)
@@ -174,7 +198,6 @@ def _check_widths(arrays: Mapping[str, np.ndarray], scene: Scene, file: str | os
     shapes = {name: (1, size, *inner.get(name, ())) for name, size in sizes.items()} | {"touching": (1, units, units)}
     kinds = {"eq_active": np.bool_, "tree_asleep": np.int32, "touching": np.bool_}
     wanted = {f"physics.scene.{n}": np.empty(shape, kinds.get(n, np.float64)) for n, shape in shapes.items()}
-    states = initial_states(StateModel.of_manifest(scene.tables, scene.manifest), 1)
     wanted |= {f"states.{name_of(keys)}": leaf for keys, leaf in jax.tree_util.tree_leaves_with_path(states)}
     for name, like in wanted.items():
         if name in arrays:

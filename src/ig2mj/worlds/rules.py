@@ -21,6 +21,8 @@ from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.logic import Expression
 from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.scene.scene import Scene
+from ig2mj.states.added import added_states
+from ig2mj.states.added_checks import AddedUpdates
 from ig2mj.states.initial import initial_states, states_of_manifest
 from ig2mj.states.model import DEFAULTS, StateModel
 from ig2mj.states.options import StateOptions
@@ -51,7 +53,7 @@ class Rules:
       model: constants of the states. initial: states of one world at its start. goal: None where there is none.
     """
 
-    _of_scenes: ClassVar[weakref.WeakKeyDictionary] = weakref.WeakKeyDictionary()  # Scene -> {options: Rules}
+    _of_scenes: ClassVar[weakref.WeakKeyDictionary] = weakref.WeakKeyDictionary()  # Scene -> {(options, added): Rules}
 
     def __init__(
         self, model: StateModel, goal: CompiledExpression | None = None, initial: ExtendedStates | None = None
@@ -61,8 +63,12 @@ class Rules:
         Args:
           goal: evaluated at the end of every step.
           initial: of one world; None: everything at room temperature, dry, clean, switched off and whole.
+
+        Raises:
+          PluginError: a state of a plug-in is at fault (`AddedUpdates.of`).
         """
         self.model, self.goal = model, goal
+        AddedUpdates.of(model)
         self.initial = initial if initial is not None else initial_states(model, 1)
         self._compiled: dict[tuple[Expression | str, bool], CompiledExpression] = {}
 
@@ -70,11 +76,12 @@ class Rules:
     def of_scene(cls, scene: Scene, options: StateOptions = DEFAULTS) -> Rules:
         """The rules of a scene that starts with its manifest's states; asked again, the same object."""
         made = cls._of_scenes.setdefault(scene, {})
-        if options not in made:
+        key = options, tuple(map(id, added_states()))  # a model keeps its states, so that no id is used again
+        if key not in made:
             model = StateModel.of_manifest(scene.tables, scene.manifest, options)
             bodies = {scene.model.body(b).name: b for b in range(scene.model.nbody)}
-            made[options] = cls(model, initial=states_of_manifest(model, scene.manifest, bodies))
-        return made[options]
+            made[key] = cls(model, initial=states_of_manifest(model, scene.manifest, bodies))
+        return made[key]
 
     def with_goal(self, goal: CompiledExpression | Expression | str | None) -> Rules:
         """The same rules with a goal. Raises what `compile_expression` raises."""

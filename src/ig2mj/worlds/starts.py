@@ -5,6 +5,7 @@ Axes: W worlds, O objects.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from typing import Any
 
@@ -18,6 +19,7 @@ from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import ActionError, EngineError
 from ig2mj.worlds import guards
+from ig2mj.worlds.plugin_states import completed
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds, episode_keys, pick_rows
 
@@ -46,6 +48,8 @@ class Starts:
         pool = self._given
         if pool is None:
             pool = Pool(physics=jax.tree.map(lambda a: a[None], self._scene[0]), states=self._initial)
+        elif self._initial is not None:
+            pool = dataclasses.replace(pool, states=completed(pool.states, self._initial))
         return self._engine.constants(pool)
 
     @functools.cached_property

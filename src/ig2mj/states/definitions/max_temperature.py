@@ -61,4 +61,4 @@ def _update(step: HeatStep) -> HeatStep:
     return step.having(max_temperature=hottest)
 
 
-SPEC = StateSpec.of_objects("max_temperature", float, UNKNOWN, _update, unit="C", abilities=THERMAL)
+SPEC = StateSpec.of_objects("max_temperature", float, UNKNOWN, _update, unit="C", abilities=THERMAL, part="heat")

@@ -83,8 +83,10 @@ def set_frozen(
 
 
 def _update(step: HeatStep) -> HeatStep:
-    now = update(step.model, step.states.temperature, step.acts, step.in_use, step.touching)
+    now = update(step.model, step.states.temperature, step.acts, step.in_use, step.view.touching)
     return step.having(temperature=now)
 
 
-SPEC = StateSpec.of_objects("temperature", float, AMBIENT_TEMPERATURE, _update, unit="C", abilities=THERMAL)
+SPEC = StateSpec.of_objects(
+    "temperature", float, AMBIENT_TEMPERATURE, _update, unit="C", abilities=THERMAL, part="heat"
+)

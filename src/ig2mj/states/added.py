@@ -1,0 +1,23 @@
+"""`STATES`: states by name, with those of plug-ins; `ig2mj.states.registry` adds ig2mj's own."""
+
+from __future__ import annotations
+
+from ig2mj.plugins import Registry
+from ig2mj.states.spec import StateSpec
+
+STATES: Registry[StateSpec] = Registry(
+    "state",
+    "an ig2mj.states.StateSpec",
+    lambda thing: isinstance(thing, StateSpec),
+    words=lambda spec: (*spec.aliases, *(name for name in spec.fields if name != spec.name)),
+)
+"""Every state of table A.4 of the paper, iGibson's others that can be asked, and those of plug-ins."""
+
+
+def added_states() -> tuple[StateSpec, ...]:
+    """States of plug-ins, in the order in which they are updated: registered ones, then those of installed packages.
+
+    Raises:
+      PluginError: one cannot be imported, is no state, or has a name that is taken.
+    """
+    return tuple(STATES.added().values())
