@@ -129,11 +129,11 @@ class Registry(Mapping[str, T], Generic[T]):
     def _load(self, plugin: Plugin) -> T:
         if plugin in self._loaded:
             return self._loaded[plugin]
-        thing = plugin.load(self.expected)
+        thing: Any = plugin.load(self.expected)
         if not self._fits(thing):
             raise plugin.error(f"{plugin.target} is {thing!r:.80}; {self.expected} is expected")
-        named = getattr(thing, "name", None)
-        if isinstance(named, str) and not isinstance(thing, type) and named != plugin.name:
+        named = _own_name(thing)
+        if named is not None and named != plugin.name:
             raise plugin.error(f"{plugin.target} has the name '{named}'; name the entry point '{self.kind}.{named}'")
         self._refuse_taken(plugin.name, thing, self._taken(), plugin.error)
         self._loaded[plugin] = thing
@@ -154,6 +154,12 @@ class Registry(Mapping[str, T], Generic[T]):
         for word in self._words(name, thing):
             if word in taken:
                 raise error(f"the name '{word}' is taken by {taken[word]}; rename it")
+
+
+def _own_name(thing: Any) -> str | None:
+    """The name that a thing itself has; classes and functions have none that counts."""
+    name = None if callable(thing) else getattr(thing, "name", None)
+    return name if isinstance(name, str) else None
 
 
 def source_of_caller() -> str:
