@@ -196,6 +196,17 @@ class ColumnMap:
         mine = self.tables.piece_object == object_index
         return self._low[mine].min(0), self._high[mine].max(0)
 
+    def covered(self, object_index: int, window: ColumnWindow) -> Bool[np.ndarray, "R C"]:
+        """Cells of a window that an object is above or below."""
+        found = np.zeros((window.rows, window.cols), bool)
+        for piece in np.flatnonzero(self.tables.piece_object == object_index).tolist():
+            columns = self.of_piece(piece)
+            overlap = columns.window.slices_in(window)
+            if overlap is not None:
+                rows, cols, own_rows, own_cols = overlap
+                found[rows, cols] |= ~np.isnan(columns.low[own_rows, own_cols])
+        return found
+
     def of_piece(self, piece: int) -> ConvexPieceColumns:
         """A piece's columns, computed at the first call after it moved."""
         found = self._columns.get(piece)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from ig2mj.predicates.parse import parse
 from ig2mj.predicates.registry import find
 from ig2mj.sampling.rules import PLACEMENTS
 from ig2mj.scene.tables import SceneTables
+
+MUTUAL = frozenset(("next_to", "in_contact_with"))
+"""Placements that either object can be moved for."""
 
 _NUMBERED = re.compile(r"(?P<category>.+)#(?P<number>\d+)")
 
@@ -44,6 +47,16 @@ class Condition:
     def is_placement(self) -> bool:
         """It says where an object is."""
         return self.predicate in PLACEMENTS
+
+    @property
+    def is_mutual(self) -> bool:
+        """Placing either of its two objects can make it true."""
+        return self.value and self.predicate in MUTUAL
+
+    def other_than(self, name: str) -> str:
+        """The argument of a placement that is not the given object."""
+        first, second = self.arguments
+        return second if first == name else first
 
     def __str__(self) -> str:
         text = f"({' '.join((self.predicate, *self.arguments))})"
@@ -112,7 +125,8 @@ class SamplingPlan:
     Attributes:
       joints: conditions about open, done first: what is in a drawer is put there when it stands as it shall.
       placements: (object, conditions on where it is), supports before what they bear; the first condition is the rule
-        that proposes places, a floor only where nothing says more.
+        that proposes places, a floor only where nothing says more. Conditions of two objects that either can be moved
+        for are with the one that is placed later.
       states: all others; cuts come last.
     """
 
@@ -121,8 +135,14 @@ class SamplingPlan:
     states: tuple[Condition, ...]
 
 
-def order(conditions: Sequence[Condition]) -> SamplingPlan:
+def order(
+    conditions: Sequence[Condition], fixed: Collection[str] = (), rank: Mapping[str, float] | None = None
+) -> SamplingPlan:
     """Orders conditions by what depends on what.
+
+    Args:
+      fixed: objects that cannot be placed. rank: of objects that do not depend on each other, the lowest is placed
+        first; None: by their names.
 
     Raises:
       StateError: objects are to be placed on each other in a circle.
@@ -130,20 +150,32 @@ def order(conditions: Sequence[Condition]) -> SamplingPlan:
     import networkx
 
     graph = networkx.DiGraph()
-    where: dict[str, list[Condition]] = {}
-    for condition in conditions:
-        if condition.is_placement:
-            where.setdefault(condition.arguments[0], []).append(condition)
+    placed = [c for c in conditions if c.is_placement]
+    for condition in placed:
+        if not _is_about_second(condition, fixed):
             graph.add_node(condition.arguments[0])
-            if condition.value and len(condition.arguments) > 1:
-                graph.add_edge(condition.arguments[1], condition.arguments[0])
+        if condition.value and len(condition.arguments) > 1 and not condition.is_mutual:
+            graph.add_edge(condition.arguments[1], condition.arguments[0])
+    for condition in placed:
+        if condition.is_mutual:
+            first, second = condition.arguments
+            turned = _is_about_second(condition, fixed)
+            turned |= graph.has_node(second) and graph.has_node(first) and networkx.has_path(graph, first, second)
+            graph.add_edge(*((first, second) if turned else (second, first)))
+    ranks = rank or {}
     try:
-        names = [n for n in networkx.lexicographical_topological_sort(graph) if n in where]
+        names = list(networkx.lexicographical_topological_sort(graph, key=lambda n: (ranks.get(n, 0.0), n)))
     except networkx.NetworkXUnfeasible:
         circle = " -> ".join(a for a, _ in networkx.find_cycle(graph))
         raise StateError(f"objects cannot be placed on each other in a circle: {circle}") from None
+    turn = {name: n for n, name in enumerate(names)}
+    where: dict[str, list[Condition]] = {}
+    for condition in placed:
+        first, *rest = condition.arguments
+        last = rest[0] if condition.is_mutual and turn[rest[0]] > turn[first] else first
+        where.setdefault(last, []).append(condition)
     placements = tuple(
-        (n, tuple(sorted(where[n], key=lambda c: (not c.value, c.predicate == "on_floor")))) for n in names
+        (n, tuple(sorted(where[n], key=lambda c: (not c.value, c.predicate == "on_floor")))) for n in names if n in where
     )
     rest = [c for c in conditions if not c.is_placement]
     return SamplingPlan(
@@ -151,3 +183,8 @@ def order(conditions: Sequence[Condition]) -> SamplingPlan:
         placements=placements,
         states=tuple(sorted((c for c in rest if c.predicate != "open"), key=lambda c: c.predicate == "sliced")),
     )
+
+
+def _is_about_second(condition: Condition, fixed: Collection[str]) -> bool:
+    """Whether only the second object of a mutual condition can be moved."""
+    return condition.is_mutual and condition.arguments[0] in fixed and condition.arguments[1] not in fixed

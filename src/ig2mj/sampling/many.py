@@ -12,7 +12,7 @@ import dataclasses
 import functools
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import jax
 import numpy as np
@@ -96,14 +96,33 @@ def sample(
       StateError, AbilityError, UnknownNameError, ExpressionError: a condition can never be made true.
       EngineError: the scene itself does not come to rest. ClusterError: see `ig2mj.cluster.job_runner.map_jobs`.
     """
-    began = time.monotonic()
     wanted = read_conditions(conditions)
     bind(wanted, scene.tables, np.random.default_rng(0))  # errors before any work
 
     work = row_jobs(scene, wanted, range(first, first + count), seed, seconds_per_row)
+    return sampled_rows(scene, work, first, where or Where(jobs), journal, progress)
+
+
+def sampled_rows(
+    scene: Scene,
+    work: JobSet[list[Job]],
+    first: int,
+    where: Where,
+    journal: Journal | None = None,
+    progress: ProgressCallback = no_progress,
+) -> Sampled:
+    """Runs jobs that each make one row, as `packed_row` gives it, and puts the rows together.
+
+    Args:
+      work: one job for each row. first: number of the first one's row. The others: as of `sample`.
+
+    Raises:
+      EngineError: a job failed, and there is no journal. ClusterError: see `ig2mj.cluster.job_runner.map_jobs`.
+    """
+    began = time.monotonic()
     try:
         with lent(scene):
-            store, failed = map_jobs(work, where or Where(jobs), journal, progress)
+            store, failed = map_jobs(work, where, journal, progress)
     finally:
         _sampler.cache_clear()
     if failed and journal is None:
@@ -120,11 +139,16 @@ def sample(
     return Sampled(
         pool=dataclasses.replace(stack(pools), digest=scene.digest) if pools else None,
         rows=tuple(numbers),
-        requested=count,
+        requested=len(work.jobs),
         rejected=rejected,
         seconds=time.monotonic() - began,
         failed=failed,
     )
+
+
+def packed_row(row: Row | None, rejected: Mapping[str, int]) -> bytes:
+    """What a job returns: a row with the reasons why candidates were turned down; no arrays where there is no row."""
+    return pack({} if row is None else _as_pool(row), {"rejected": dict(rejected)})
 
 
 def row_jobs(
@@ -157,7 +181,7 @@ def row_job(
         except EngineError as e:
             raise WholeRunError(e) from e
         row, rejected = sample_row(sampler, wanted, seed, number, math.inf if seconds is None else seconds)
-    return pack({} if row is None else _as_pool(row), {"rejected": dict(rejected)})
+    return packed_row(row, rejected)
 
 
 @functools.lru_cache(maxsize=1)

@@ -45,6 +45,13 @@ SETTLED_TRIES = 8
 AT_ONCE = 4
 """Candidates that count as one unit of work where the predicate is false before anything is let go."""
 
+FALLS_IN = 4
+"""Of loosely supported candidates of which the predicate is false before anything is let go, one in so many is let go
+nevertheless: it may fall into the container."""
+
+TILT = 0.35
+"""Radians by which a tipped object leans at most."""
+
 LIFTS = 3
 """Times that an object that stands in something is lifted by as much as it stands in it."""
 
@@ -110,6 +117,16 @@ Areas = Callable[[Footprint, np.random.Generator], Iterator[PlacementArea]]
 """A rule: areas to try for an object of a given footprint, the likely ones first; may be endless."""
 
 
+def holding_at_once(areas: Areas) -> Areas:
+    """A rule's areas, with the predicate asked before physics, too (`PlacementArea.holds_at_once`)."""
+
+    def asked(shape: Footprint, rng: np.random.Generator) -> Iterator[PlacementArea]:
+        for area in areas(shape, rng):
+            yield dataclasses.replace(area, holds_at_once=True)
+
+    return asked
+
+
 @dataclasses.dataclass
 class Budget:
     """How much may still be tried. Work is counted, not timed, so that a seed gives the same state on any machine.
@@ -117,14 +134,16 @@ class Budget:
     Attributes:
       work: candidates that may be let go, and searches for candidates; each is one unit, some 5 to 20 ms, and those
         that take long to settle are more.
-      seconds: wall time after which nothing is begun any more; infinite unless somebody is waiting.
+      seconds: time after which nothing is begun any more; infinite unless somebody is waiting. clock: that measures
+        it; default: wall time.
     """
 
     work: int = 250
     seconds: float = math.inf
+    clock: Callable[[], float] = time.monotonic
 
     def __post_init__(self) -> None:
-        self._end = time.monotonic() + self.seconds
+        self._end = self.clock() + self.seconds
 
     def spend(self) -> bool:
         """Takes a unit; False where none is left."""
@@ -135,11 +154,11 @@ class Budget:
 
     def spent(self) -> bool:
         """Whether it is used up."""
-        return self.work <= 0 or time.monotonic() >= self._end
+        return self.work <= 0 or self.clock() >= self._end
 
     def part(self, share: int) -> Budget:
         """A budget of one part in `share` of what is left; what it spends is not taken from this one."""
-        return Budget(max(self.work // share, 1), self._end - time.monotonic())
+        return Budget(max(self.work // share, 1), self._end - self.clock(), self.clock)
 
 
 Rejections = collections.Counter
@@ -186,6 +205,7 @@ class Placer:
         """
         before = self.query.save()
         task = _Task(object_index, truth, rng, budget, rejected, before, Bystanders(self.query, before))
+        container = False
         for draw in range(DRAWS):
             if budget.spent():
                 rejected["budget spent"] += 1
@@ -193,7 +213,11 @@ class Placer:
             support = SUPPORT[min(draw * len(SUPPORT) // FIRST_DRAWS, len(SUPPORT) - 1)]
             aligned = along if draw % 2 else -1
             quat, shift = self._orientation(object_index, rng, aligned), rng.uniform(-CELL / 2, CELL / 2, 2)
+            if container and support == "loose" and draw // 2 % 2:
+                quat = _tipped(quat, rng, np.asarray(self.query.view.object_quat[0, aligned]) if aligned >= 0 else None)
             shape = self.query.footprint(object_index, quat, shift)
+            if draw == 0:
+                container = any(area.loose for area in itertools.islice(areas(shape, np.random.default_rng(0)), 1))
             for area in itertools.islice(areas(shape, rng), AREAS):
                 if self._try_area(task, quat, shape, area, support):
                     return True
@@ -304,9 +328,11 @@ class Placer:
         else:
             return "collides"
         loose = support == "loose" and area.loose
-        if area.holds_at_once and not loose and not task.truth():
-            task.budget.work += next(task.at_once) % AT_ONCE > 0
-            return "predicate false"
+        if area.holds_at_once and not task.truth():
+            turn = next(task.at_once)
+            if not loose or turn % FALLS_IN:
+                task.budget.work += turn % AT_ONCE > 0
+                return "predicate false"
         start = np.array(query.view.object_com[0, placed])
 
         def moved(view: PhysicsView) -> str:
@@ -360,6 +386,23 @@ class Placer:
         c, s = np.cos(angle / 2), np.sin(angle / 2)
         turned = np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
         return turned / np.linalg.norm(turned)
+
+
+def _tipped(
+    quat: Float[np.ndarray, "4"], rng: np.random.Generator, along: Float[np.ndarray, "4"] | None
+) -> Float[np.ndarray, "4"]:
+    """An orientation turned onto another side and tilted a little: a book stands and leans in a bag, it does not lie.
+
+    `along`: orientation of the container, about one of whose horizontal axes the object is turned; None: about any.
+    """
+    angle = rng.uniform(-np.pi, np.pi)
+    if along is not None:
+        w, x, y, z = along
+        angle = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) + rng.integers(4) * np.pi / 2
+    turn = (np.pi / 2 + rng.uniform(-TILT, TILT)) / 2
+    w, (x, y) = np.cos(turn), np.sin(turn) * np.array([np.cos(angle), np.sin(angle)])
+    a, b, c, d = quat
+    return np.array([w * a - x * b - y * c, w * b + x * a + y * d, w * c + y * a - x * d, w * d + x * c - y * b])
 
 
 def _orientations(entries: Sequence) -> tuple[np.ndarray | None, np.ndarray]:

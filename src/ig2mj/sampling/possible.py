@@ -33,29 +33,29 @@ def possible_origins(
     """
     covered = shape.covered
     found = np.ones((rows, cols), bool)
-    found &= ~_meets(level.blocked, covered, rows, cols)
+    found &= ~meets(level.blocked, covered, rows, cols)
     if not full:
         return found
     bears = np.isin(level.owner, list(supports))
     if not bears.any():
         return np.zeros((rows, cols), bool)
-    found &= ~_meets(~bears, shape.base, rows, cols)
+    found &= ~meets(~bears, shape.base, rows, cols)
     lowest = float(level.surface[bears].min()) - shape.low - LEVEL_BASE
     highest = float(level.surface[bears].max()) - shape.low + LEVEL_BASE
     for share in SHARES:
         top = shape.low + share * (shape.high - shape.low)
         reaching = covered & (np.nan_to_num(shape.topside, nan=-np.inf) >= top)
-        found &= ~_meets(level.ceiling < lowest + top + HEADROOM, reaching, rows, cols)
+        found &= ~meets(level.ceiling < lowest + top + HEADROOM, reaching, rows, cols)
         bottom = shape.high - share * (shape.high - shape.low)
         hanging = covered & (np.nan_to_num(shape.underside, nan=np.inf) <= bottom)
-        found &= ~_meets(level.surface > highest + bottom, hanging, rows, cols)
+        found &= ~meets(level.surface > highest + bottom, hanging, rows, cols)
     return found
 
 
-def _meets(
+def meets(
     wrong: Bool[np.ndarray, "R C"], mask: Bool[np.ndarray, "K L"], rows: int, cols: int
 ) -> Bool[np.ndarray, "M N"]:
-    """For every cell of the origin whether a cell of the mask falls on a wrong one."""
+    """For every cell of the origin whether a cell of the object's mask falls on one of the level that is `wrong`."""
     if not wrong.any() or not mask.any():
         return np.zeros((rows, cols), bool)
     import scipy.signal  # half a second

@@ -72,6 +72,11 @@ class SceneQuery:
         self._update_map()
         return self._map.level(window, height, without)
 
+    def covered(self, object_index: int, window: ColumnWindow) -> Bool[np.ndarray, "R C"]:
+        """Cells of a window that an object is above or below."""
+        self._update_map()
+        return self._map.covered(object_index, window)
+
     def box(self, object_index: int) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
         """World box of an object's collision geometry, low and high corner, metres."""
         self._update_map()

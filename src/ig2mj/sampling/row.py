@@ -1,7 +1,7 @@
 """One initial state that fulfils a set of conditions: objects are placed one after another, with backtracking.
 
-Order: joints (those of an object that is to be placed, once it stands), placements from supports to the objects on
-them, then states without a placement. If an object finds no position, the sampler backtracks to the one before it. At
+Order: joints (those of an object that is to be placed, once it stands), cuts of wholes whose halves are to be placed,
+placements from supports to the objects on them, then states without a placement. If an object finds no position, the sampler backtracks to the one before it. At
 the end all conditions are checked together: they hold, everything sleeps, no object penetrates another."""
 
 from __future__ import annotations
@@ -20,9 +20,18 @@ from ig2mj.predicates.literals import object_index, room_index
 from ig2mj.sampling.bystanders import Bystanders
 from ig2mj.sampling.conditions import Condition, order
 from ig2mj.sampling.joints import JointMover
-from ig2mj.sampling.placement import NOWHERE, RESTING_PENETRATION, Areas, Budget, Placer, Rejections
+from ig2mj.sampling.placement import (
+    NOWHERE,
+    RESTING_PENETRATION,
+    Areas,
+    Budget,
+    Placer,
+    Rejections,
+    holding_at_once,
+)
 from ig2mj.sampling.query import SceneQuery
-from ig2mj.sampling.rules import PLACEMENTS, elsewhere, on_floor
+from ig2mj.sampling.rules import PLACEMENTS, elsewhere, next_to, on_floor
+from ig2mj.sampling.rules.borne_by import borne_by
 from ig2mj.sampling.setters import Change, set_by_name
 from ig2mj.sampling.truths import Truths
 from ig2mj.states.model import StateModel
@@ -33,6 +42,12 @@ SHARE = 3
 
 OPENINGS = 12
 """Positions sampled for an object's joints until it stays at rest: a half-open lid may fall shut."""
+
+KEPT_TRUTHS = 256
+"""Lists of conditions whose evaluation is kept."""
+
+WITHOUT_CONTACT = frozenset(("inside", "next_to", "under"))
+"""Placements that can be asked of an object that has not come to rest yet."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,6 +70,9 @@ class RowSampler:
         self.query, self.model = query, model
         self._placer = Placer(query)
         self._truths: dict[tuple[Condition, ...], Truths] = {}
+        tables = model.tables
+        self._fixed = frozenset(n for n, fixed in zip(tables.object_names, tables.object_fixed, strict=True) if fixed)
+        self._ranks = {name: -_volume(model, index) for index, name in enumerate(tables.object_names)}
         self.start_from(query.save(), states)
 
     @property
@@ -67,37 +85,50 @@ class RowSampler:
         self._start, self._initial = start, jax.tree.map(np.asarray, states)
 
     def sample(
-        self, conditions: Sequence[Condition], rng: np.random.Generator, budget: Budget, rejected: Rejections
+        self,
+        conditions: Sequence[Condition],
+        rng: np.random.Generator,
+        budget: Budget,
+        rejected: Rejections,
+        keep: bool = False,
     ) -> Row | None:
         """A row, or None where the budget did not suffice; the world is left in it.
 
         Args:
           conditions: of objects' names (see `conditions.bind`). rejected: counts of reasons are added to it.
+          keep: leave objects as they are of which everything holds already, and place larger objects first; else every
+            object is placed again.
 
         Raises:
           StateError, AbilityError, UnknownNameError: a condition that can never be made true.
         """
-        plan = order(conditions)
-        self._truth = self._truths_of(tuple(conditions))
+        plan = order(conditions, self._fixed, self._ranks if keep else None)
+        self._truths_of(tuple(conditions))  # refuses what can never hold
         self.query.load(self._start)
-        self._states = self._initial
+        self._states, self._keep = self._initial, keep
         self._others = Bystanders(self.query, self._start)
         placed = {name for name, wanted in plan.placements if wanted[0].value}
         self._joints = [c for c in plan.joints if c.arguments[0] in placed]
         for condition in plan.joints:
             if condition not in self._joints and not self._open(condition, rng, rejected):
                 return None
+        cuts = [c for c in plan.states if c.predicate == "sliced" and c.value and self._halves(c.arguments[0]) & placed]
+        self._set_all(cuts, rng)
         if not self._place_all(plan.placements, rng, budget, rejected):
             return None
-        for condition in plan.states:
-            self._set(condition, rng)
-        if any(c.predicate == "sliced" for c in plan.states):
-            self.query.settle()
+        self._set_all([c for c in plan.states if c not in cuts], rng)
         problem = self._problem(conditions, [name for name, _ in plan.placements])
         if problem:
             rejected[problem] += 1
             return None
         return Row(self.query.save(), self._states)
+
+    def _set_all(self, conditions: Sequence[Condition], rng: np.random.Generator) -> None:
+        for condition in conditions:
+            if not (self._keep and self._holds((condition,))):
+                self._set(condition, rng)
+        if any(c.predicate == "sliced" for c in conditions):
+            self.query.settle()
 
     def holds(self, conditions: Sequence[Condition], states: ExtendedStates) -> bool:
         """Whether conditions hold in the world as it is now, with the given extended states."""
@@ -105,7 +136,7 @@ class RowSampler:
 
     def _truths_of(self, conditions: tuple[Condition, ...]) -> Truths:
         if conditions not in self._truths:
-            if len(self._truths) >= 64:
+            if len(self._truths) >= KEPT_TRUTHS:
                 self._truths.clear()
             self._truths[conditions] = Truths(self.model, conditions)
         return self._truths[conditions]
@@ -150,20 +181,19 @@ class RowSampler:
         """Places one object, if it is not where it shall be already and negations are all that is asked."""
         index = object_index(self.model, name)
         rule = wanted[0]
+        if self._keep and self._holds(wanted):
+            return True
         if self.model.tables.object_fixed[index]:
             if self._holds(wanted):
                 return True
             raise StateError(f"'{name}' is fixed: it cannot be moved so that {rule} becomes true")
         if not rule.value and self._holds(wanted):
             return True
-        areas = self._areas(index, rule)
-        for other in wanted[1:]:
-            if other.value and other.predicate == "on_floor":
-                areas = on_floor.within(areas, self.query, room_index(self.model, other.arguments[1]))
+        areas = self._areas(name, wanted)
         before = self.query.save()
         along = -1
         if rule.value and rule.predicate != "on_floor":
-            along = object_index(self.model, rule.arguments[1])
+            along = object_index(self.model, rule.other_than(name))
         if not self._placer.place(index, areas, lambda: self._holds(wanted), rng, budget, rejected, along):
             return False
         opened = [c for c in self._joints if c.arguments[0] == name]
@@ -186,15 +216,37 @@ class RowSampler:
             self.query.load(mover.before)
         return False
 
-    def _areas(self, index: int, rule: Condition) -> Areas:
+    def _areas(self, name: str, wanted: Sequence[Condition]) -> Areas:
+        """Where an object may be put: what the first condition proposes, narrowed by the others."""
+        index = object_index(self.model, name)
+        rule, others = _proposing(wanted)
         if rule.predicate == "on_floor":
             second = room_index(self.model, rule.arguments[1])
         else:
-            second = object_index(self.model, rule.arguments[1])
-        return (PLACEMENTS[rule.predicate] if rule.value else elsewhere.areas)(self.query, index, second)
+            second = object_index(self.model, rule.other_than(name))
+        if rule.value and rule.predicate == "next_to":
+            areas = next_to.beside(self.query, second, None, looks=rule.arguments[0] == name)
+        else:
+            areas = (PLACEMENTS[rule.predicate] if rule.value else elsewhere.areas)(self.query, index, second)
+        for other in others:
+            if other.predicate == "on_floor":
+                areas = on_floor.within(areas, self.query, room_index(self.model, other.arguments[1]))
+            elif other.predicate == "next_to":
+                neighbour = object_index(self.model, other.other_than(name))
+                areas = next_to.narrowed(areas, self.query, neighbour, looks=other.arguments[0] == name)
+            elif rule.predicate == "next_to" and other.predicate in ("inside", "on_top"):
+                bearer = object_index(self.model, other.arguments[1])
+                areas = borne_by(areas, self.query, bearer, loose=other.predicate == "inside")
+        if rule.predicate == "next_to" and all(c.predicate in WITHOUT_CONTACT for c in wanted):
+            return holding_at_once(areas)
+        return areas
+
+    def _halves(self, whole: str) -> set[str]:
+        names = self.model.tables.object_names
+        return {names[h] for h in self.model.parameters.halves_of(object_index(self.model, whole))}
 
     def _holds(self, conditions: Sequence[Condition]) -> bool:
-        return self._truth.hold(conditions, self._states, self.query.view)
+        return self.holds(conditions, self._states)
 
     def _change(self, condition: Condition, rng: np.random.Generator) -> Change:
         (name,) = condition.arguments
@@ -221,3 +273,20 @@ class RowSampler:
         if any(deepest[object_index(self.model, name)] > RESTING_PENETRATION for name in placed):
             return "stands in something at the end"
         return ""
+
+
+def _proposing(wanted: Sequence[Condition]) -> tuple[Condition, list[Condition]]:
+    """The condition that proposes places, and those that narrow them: a neighbour says most precisely where."""
+    if not wanted[0].value:
+        return wanted[0], []
+    needed = [c for c in wanted if c.value]
+    inner = any(c.predicate in ("inside", "on_top") for c in needed)
+    rule = next((c for c in needed if inner and c.predicate == "next_to"), needed[0])
+    return rule, [c for c in needed if c is not rule]
+
+
+def _volume(model: StateModel, index: int) -> float:
+    """Of the boxes of an object's pieces, cubic metres: how hard it is to find room for it."""
+    tables = model.tables
+    boxes = np.ptp(tables.piece_vertices[tables.piece_object == index], axis=1)
+    return float(np.prod(boxes, axis=1).sum())
