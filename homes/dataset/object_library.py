@@ -23,16 +23,40 @@ PLACED = ("car", "christmas_tree", "christmas_tree_decorated", "grill", "paintin
 VARIED = ("apple", "bath_towel", "carving_knife", "cauldron", "hand_towel", "notebook", "steak")
 """What the six activities are about: three models of each."""
 
+PACKED = ("jeans", "pumpkin", "stocking", "sweater", "t-shirt", "teapot")
+"""What activities pack, or put something into: folded, small or hollow from model 4 on."""
+
 MODELS = {
     "carton": (2,),
+    "casserole": (4, 0),
+    "rag": (5, 0),
     "shelf": (14,),
+    **dict.fromkeys(("parsley", "pop_case", "salad"), (3, 0)),
+    **dict.fromkeys(PACKED, (4, 0)),
     **dict.fromkeys(VARIED, (0, 1, 2)),
     "bath_towel": (0, 1, 2, 5, 6, 7),
     "carving_knife": (0, 1, 2, 4, 5, 6),
 }
-"""Numbers of the models where it is not the first alone. The roomiest carton holds what activities pack; the shelf is a
-board for a wall, which no home has; the last three bath towels are rolled and the last three carving knives stand on
-their handles, for hands to which nothing sticks."""
+"""Numbers of the models where it is not the first alone; the first here is the one that the category's name stands for
+(`PREFERRED_FILE`). The roomiest carton holds what activities pack; casserole 4 is an empty dish, salad 3 lies on a plate;
+the shelf is a board for a wall, which no home has; the last three bath towels are rolled and the last three carving
+knives stand on their handles, for hands to which nothing sticks."""
+
+PREFERRED_FILE = "preferred.json"
+"""Next to the categories: category -> the model that its name stands for, where that is not the first by name."""
+
+
+def preferred_models(models: list[tuple[str, str, pathlib.Path]]) -> dict[str, str]:
+    """What `PREFERRED_FILE` holds, from the models as `library_models` gives them."""
+    by_category: dict[str, dict[int, str]] = {}
+    for category, model, _ in models:
+        by_category.setdefault(category, {})[int(model.rpartition("_")[2])] = model
+    found = {}
+    for category, numbered in by_category.items():
+        wanted = MODELS.get(category, (0,))[0]
+        if wanted in numbered and wanted != min(numbered):
+            found[category] = numbered[wanted]
+    return found
 
 
 def is_fixed(category: str) -> bool:

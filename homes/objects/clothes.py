@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from ..shapes import materials, textures
 from ..shapes.bricks import arc, ball, block, box, cylinder, decal, extrusion, hull, lathe, prism, rod, soft_box, tube
-from ..shapes.vessels import ring
+from ..shapes.vessels import ring, tray
 from .cloths import cloth
 from .entry import Entry
 from .model import ObjectBuilder
@@ -75,8 +76,32 @@ MITTEN = [
 ]
 
 
-def garment(b: ObjectBuilder, *, outline: list[tuple[float, float]], kind: str | None = None, layers: int = 2) -> None:
-    """A flat garment lying on its back, collar towards +x; collides as one box of full size."""
+STANDING_STOCKING = (0.260, 0.150, 0.360)
+"""m."""
+
+GARMENT_DENSITY = 65.0
+"""kg/m^3 of the box around a folded garment."""
+
+FOLDED = 4
+"""Number of the first garment that is folded, or stands; only the object library has such."""
+
+
+def garment(
+    b: ObjectBuilder,
+    *,
+    outline: list[tuple[float, float]],
+    kind: str | None = None,
+    layers: int = 2,
+    folds: tuple[float, float, float] | None = None,
+) -> None:
+    """A flat garment lying on its back, collar towards +x; collides as one box of full size.
+
+    folds: size (x, y, z) of models from number `FOLDED` on, which are folded for a shelf or a box.
+    """
+    if folds is not None and b.index >= FOLDED:
+        b.size, b.mass = folds, GARMENT_DENSITY * math.prod(folds)
+        folded_garment(b, kind=kind)
+        return
     x, y, z = b.size
     turned = outline if _area(outline) > 0 else outline[::-1]
     points = [(u * x, v * y) for u, v in turned]
@@ -86,6 +111,41 @@ def garment(b: ObjectBuilder, *, outline: list[tuple[float, float]], kind: str |
         shrink = 1 - 0.02 * k
         b.add(extrusion([(u * shrink, v * shrink) for u, v in points], t, []).at(z=k * t), look)
     b.add(box(x, y, z).collision_only(), look)
+
+
+def folded_garment(b: ObjectBuilder, *, layers: int = 3, kind: str | None = None) -> None:
+    """A shirt, sweater or pair of trousers folded for a shelf, its collar or waistband towards +x; collides as one
+    box."""
+    x, y, z = b.size
+    look = cloth(b, kind)
+    t = z / layers
+    for k in range(layers):
+        b.add(
+            soft_box(x - 0.004 * (k % 2), y - 0.006 * k, t, 0.45 * t).visual_only().at(0.002 * (k % 2), 0, k * t),
+            look,
+        )
+    band = [(0.46 * x, 0.2 * y * math.cos(a), z + 0.004 * math.sin(a)) for a in (k * math.pi / 6 for k in range(7))]
+    b.add(tube(band, 0.004, 6, hulls=0), look)
+    b.add(box(x, y, z).collision_only(), look)
+
+
+def stocking(b: ObjectBuilder, **options: Any) -> None:
+    """A Christmas stocking, flat; from number `FOLDED` on of stiff felt, standing on its foot, open at the top; its toe
+    towards +x."""
+    if b.index < FOLDED:
+        garment(b, **options)
+        return
+    b.size, b.mass, b.rest = STANDING_STOCKING, 0.16, "upright"
+    x, y, z = b.size
+    felt, fur = cloth(b, "stripes"), materials.plain("white", "fabric")
+    wall, leg, foot = 0.006, 0.58 * x, 0.32 * z
+    rear = -x / 2 + leg / 2
+    b.add(tray(leg, y, z, wall).at(rear), felt)
+    toe = soft_box(x - leg + wall, y, foot, 0.3 * foot, 2)
+    b.add(toe.at((leg - wall) / 2), felt)
+    for s in (-1, 1):
+        b.add(block((leg + 0.01, 0.008, 0.16 * z), (rear, s * (y / 2 + 0.001), 0.9 * z)).visual_only(), fur)
+        b.add(block((0.008, y + 0.01, 0.16 * z), (rear + s * (leg / 2 + 0.001), 0, 0.9 * z)).visual_only(), fur)
 
 
 def _area(points: list[tuple[float, float]]) -> float:
@@ -312,14 +372,18 @@ def hanger(b: ObjectBuilder) -> None:
 
 
 CATEGORIES = [
-    Entry("t-shirt", garment, (0.620, 0.560, 0.020), 0.18, 4, options={"outline": SHIRT}),
-    Entry("sweater", garment, (0.620, 0.640, 0.040), 0.45, 4, options={"outline": LONG}),
+    Entry("t-shirt", garment, (0.620, 0.560, 0.020), 0.18, FOLDED, extra=1,
+          options={"outline": SHIRT, "folds": (0.290, 0.240, 0.040)}),
+    Entry("sweater", garment, (0.620, 0.640, 0.040), 0.45, FOLDED, extra=1,
+          options={"outline": LONG, "folds": (0.310, 0.270, 0.085)}),
     Entry("coat", garment, (0.900, 0.640, 0.060), 1.40, 3, options={"outline": LONG, "kind": "plain"}),
-    Entry("jeans", garment, (0.900, 0.400, 0.035), 0.60, 4, options={"outline": TROUSERS, "kind": "plain"}),
+    Entry("jeans", garment, (0.900, 0.400, 0.035), 0.60, FOLDED, extra=1,
+          options={"outline": TROUSERS, "kind": "plain", "folds": (0.330, 0.250, 0.070)}),
     Entry("dress", garment, (0.900, 0.500, 0.022), 0.30, 3, options={"outline": DRESS}),
     Entry("underwear", garment, (0.240, 0.320, 0.012), 0.06, 4, options={"outline": BRIEFS}),
     Entry("sock", garment, (0.280, 0.120, 0.012), 0.03, 4, options={"outline": SOCK, "kind": "stripes"}),
-    Entry("stocking", garment, (0.420, 0.210, 0.020), 0.10, 4, options={"outline": SOCK, "kind": "stripes"}),
+    Entry("stocking", stocking, (0.420, 0.210, 0.020), 0.10, FOLDED, extra=1,
+          options={"outline": SOCK, "kind": "stripes"}),
     Entry("glove", garment, (0.230, 0.130, 0.024), 0.06, 3, options={"outline": MITTEN}),
     Entry("pajamas", folded_pair, (0.300, 0.260, 0.070), 0.45, 2),
     Entry("scarf", scarf, (0.300, 0.200, 0.045), 0.16, 3),

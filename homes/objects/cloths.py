@@ -16,6 +16,9 @@ from .model import ObjectBuilder
 ROLLED = 5
 """Number of the first rolled bath towel. Only the object library has such."""
 
+FOLDED = 5
+"""Number of the first folded rag; likewise."""
+
 ROLLED_DENSITY = 330.0
 """kg/m^3 of a cloth that is tightly rolled up; folded, a category's mean applies to the box around it."""
 
@@ -54,6 +57,17 @@ def folded(b: ObjectBuilder, *, layers: int = 4, kind: str | None = None, wipes:
     b.add(join(pile) + box(x, y, z).collision_only(), look)
     if wipes:
         b.area("cleaning_tool_area", (x * 0.98, y * 0.98, 0.2 * z), (0, 0, 0.1 * z))
+
+
+def rag(b: ObjectBuilder, **options: Any) -> None:
+    """Spread out; from number `FOLDED` on folded in four, so that it goes into a bucket."""
+    if b.index < FOLDED:
+        spread(b, **options)
+        return
+    x, y, z = b.size
+    b.mass = 0.05
+    b.size = (x / 2, y / 2, 2 * z)
+    folded(b, **options)
 
 
 def bath_towel(b: ObjectBuilder, **options: Any) -> None:
@@ -142,7 +156,7 @@ CATEGORIES = [
     Entry("dishtowel", spread, (0.450, 0.300, 0.014), 0.08, 5, vary=0.1, options={"wipes": True}),
     Entry("hand_towel", folded, (0.200, 0.280, 0.040), 0.18, 5, options={"wipes": True}),
     Entry("bath_towel", bath_towel, (0.300, 0.360, 0.090), 0.55, ROLLED, extra=3, options={"wipes": True, "layers": 5}),
-    Entry("rag", spread, (0.320, 0.280, 0.018), 0.05, 5, vary=0.12, options={"wipes": True}),
+    Entry("rag", rag, (0.320, 0.280, 0.018), 0.05, FOLDED, extra=1, vary=0.12, options={"wipes": True}),
     Entry("dinner_napkin", folded, (0.190, 0.190, 0.008), 0.035, 3, options={"wipes": True, "layers": 3}),
     Entry("paper_towel", kitchen_roll, (0.120, 0.120, 0.260), 0.25, 3, rest="standing", uniform=True),
     Entry("sheet", folded, (0.320, 0.420, 0.070), 0.80, 4, options={"layers": 6}),

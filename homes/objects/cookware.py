@@ -98,7 +98,15 @@ def kettle(b: ObjectBuilder) -> None:
     b.add(lathe([(0.014, 0), (0.014, 0.02)], 10).at(shift, 0, body), materials.plain("black"))
 
 
+OPEN = 4
+"""Number of the first teapot that is hollow; only the object library has such."""
+
+
 def teapot(b: ObjectBuilder) -> None:
+    """Closed and solid; from number `OPEN` on hollow, without its lid."""
+    if b.index >= OPEN:
+        open_teapot(b)
+        return
     x, y, z = b.size
     r = y / 2
     look = materials.plain(b.pick(("porcelain", "sky", "terracotta", "dark_green")), "ceramic", 0.7)
@@ -119,10 +127,24 @@ def teapot(b: ObjectBuilder) -> None:
     )
 
 
+def open_teapot(b: ObjectBuilder) -> None:
+    """A hollow teapot without its lid: a wide mouth, a spout and a handle."""
+    x, y, z = b.size
+    r = y / 2
+    look = materials.plain(b.pick(("porcelain", "sky", "terracotta", "dark_green")), "ceramic", 0.7)
+    b.add(turned_vessel([(0.84 * r, 0), (0.98 * r, 0.3 * z), (r, 0.55 * z), (0.9 * r, z)], 0.005, 5), look)
+    spout = [(0.9 * r, 0, 0.3 * z), (1.1 * r, 0, 0.42 * z), (x / 2 - 0.012, 0, 0.82 * z)]
+    b.add(tube(spout, 0.012, 8, hulls=1), look)
+    b.add(
+        tube([p * (1.2, 1, 1.1) + (-0.92 * r, 0, 0.52 * z) for p in arc(0.24 * z, 100, 260, 8)], 0.007, 8, hulls=1),
+        look,
+    )
+
+
 CATEGORIES = [
     Entry("frying_pan", frying_pan, (0.450, 0.260, 0.060), 1.20, 6, rest="upright"),
     Entry("saucepan", saucepan, (0.360, 0.180, 0.110), 1.10, 5, rest="upright"),
     Entry("cauldron", cauldron, (0.360, 0.360, 0.360), 6.00, 3, rest="upright", uniform=True, two_hands=True),
     Entry("kettle", kettle, (0.230, 0.180, 0.230), 1.00, 4, rest="upright", uniform=True),
-    Entry("teapot", teapot, (0.230, 0.150, 0.150), 0.70, 4, rest="upright", uniform=True),
+    Entry("teapot", teapot, (0.230, 0.150, 0.150), 0.70, OPEN, extra=1, rest="upright", uniform=True),
 ]

@@ -208,8 +208,26 @@ def egg(b: ObjectBuilder) -> None:
     b.add(lathe(profile, 14).at(z=-x / 2).turned("y", 90).at(z=r), shell)
 
 
-def served(b: ObjectBuilder, *, dish: str = "bowl", filling: tuple = ("red",), bits: tuple = ()) -> None:
-    """A filled dish: soup or salad in a bowl, lasagne or a casserole in an oven dish. The filling is solid."""
+PLATED = 0.036
+"""m. Height of food that is served on a plate."""
+
+
+def served(
+    b: ObjectBuilder,
+    *,
+    dish: str = "bowl",
+    filling: tuple = ("red",),
+    bits: tuple = (),
+    filled: int | None = None,
+    deep: int | None = None,
+) -> None:
+    """A filled dish: soup or salad in a bowl, lasagne or a casserole in an oven dish. The filling is solid.
+
+    filled: number of models that are filled, the others are empty dishes; None: all are. deep: number of models whose
+    bowl is deep, the others are plates; None: all are.
+    """
+    if deep is not None and b.index >= deep:
+        b.size, b.mass = (*b.size[:2], PLATED), 0.45
     x, y, z = b.size
     look = materials.plain(b.pick(("porcelain", "cream", "sky")), "ceramic", 0.7)
     fill = materials.skin(b.pick(filling), b.rng, 0.3, 0.05)
@@ -220,13 +238,16 @@ def served(b: ObjectBuilder, *, dish: str = "bowl", filling: tuple = ("red",), b
         b.add(lathe([(0.45 * r, 0.1 * z), (0.86 * r, level)], 16), fill)
     else:
         b.add(tray(x, y, z, 0.007, spread=0.012), look)
-        b.add(
-            hull(
-                [(sx * (x / 2 - 0.02), sy * (y / 2 - 0.02), 0.008) for sx in (-1, 1) for sy in (-1, 1)]
-                + [(sx * (x / 2 - 0.01), sy * (y / 2 - 0.01), level) for sx in (-1, 1) for sy in (-1, 1)]
-            ),
-            fill,
-        )
+        if filled is None or b.index < filled:
+            b.add(
+                hull(
+                    [(sx * (x / 2 - 0.02), sy * (y / 2 - 0.02), 0.008) for sx in (-1, 1) for sy in (-1, 1)]
+                    + [(sx * (x / 2 - 0.01), sy * (y / 2 - 0.01), level) for sx in (-1, 1) for sy in (-1, 1)]
+                ),
+                fill,
+            )
+        else:
+            bits = ()
         for s in (-1, 1):
             b.add(box(0.25 * x, 0.025, 0.012).at(0, s * (y / 2 + 0.006), 0.8 * z).visual_only(), look)
     for k in range(12 if bits else 0):
@@ -290,16 +311,16 @@ CATEGORIES = [
     Entry("sushi", sushi, (0.050, 0.028, 0.026), 0.030, 4),
     Entry("cheese", cheese, (0.120, 0.080, 0.045), 0.25, 4),
     Entry("egg", egg, (0.057, 0.044, 0.044), 0.060, 4, uniform=True),
-    Entry("salad", served, (0.200, 0.200, 0.085), 0.65, 3, rest="upright", uniform=True,
-          options={"filling": ("lime",), "bits": ("leaf", "red", "lime", "orange")}),
+    Entry("salad", served, (0.200, 0.200, 0.085), 0.65, 3, extra=1, rest="upright", uniform=True,
+          options={"filling": ("lime",), "bits": ("leaf", "red", "lime", "orange"), "deep": 3}),
     Entry("soup", served, (0.170, 0.170, 0.070), 0.70, 3, rest="upright", uniform=True,
           options={"filling": ("orange", (0.78, 0.70, 0.35), "dark_red"), "bits": ("green",)}),
     Entry("guacamole", served, (0.120, 0.120, 0.055), 0.35, 2, rest="upright", uniform=True,
           options={"filling": ((0.56, 0.68, 0.30),)}),
     Entry("puree", served, (0.130, 0.130, 0.055), 0.38, 2, rest="upright", uniform=True,
           options={"filling": ((0.93, 0.82, 0.50),)}),
-    Entry("casserole", served, (0.220, 0.320, 0.075), 2.20, 4, rest="upright",
-          options={"dish": "tray", "filling": ((0.78, 0.50, 0.20),), "bits": ("green", "orange")}),
+    Entry("casserole", served, (0.220, 0.320, 0.075), 2.20, 4, extra=1, rest="upright",
+          options={"dish": "tray", "filling": ((0.78, 0.50, 0.20),), "bits": ("green", "orange"), "filled": 4}),
     Entry("lasagna", served, (0.190, 0.270, 0.065), 1.50, 3, rest="upright",
           options={"dish": "tray", "filling": ((0.80, 0.42, 0.18),), "bits": ("red", "cream")}),
     Entry("chip", chip_bag, (0.260, 0.190, 0.065), 0.15, 4),

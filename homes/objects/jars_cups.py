@@ -150,15 +150,25 @@ def pills(b: ObjectBuilder) -> None:
     b.add(*band(0.9 * r, 0.12 * z, 0.62 * z, materials.plain("paper", "paper")))
 
 
+SIX_PACK = 3
+"""Number of the first case of six cans, which goes into a bucket; only the object library has such."""
+
+SIX_PACK_SIZE = (0.134, 0.200, 0.125)
+"""m."""
+
+
 def case_of_cans(b: ObjectBuilder) -> None:
-    """A cardboard tray with a block of cans under film."""
+    """A cardboard tray with a block of cans under film: twelve, from number `SIX_PACK` on six."""
+    columns, rows = 3, 4
+    if b.index >= SIX_PACK:
+        b.size, b.mass, columns, rows = SIX_PACK_SIZE, 2.25, 2, 3
     x, y, z = b.size
     b.add(box(x, y, 0.35 * z), materials.plain("cardboard", "cardboard"))
     red = materials.plain(b.pick(("red", "blue", "green")), "metal", 0.6)
-    for i in range(3):
-        for j in range(4):
-            px, py = (i - 1) * x / 3, (j - 1.5) * y / 4
-            r = min(x / 6.3, y / 8.4)
+    for i in range(columns):
+        for j in range(rows):
+            px, py = (i - (columns - 1) / 2) * x / columns, (j - (rows - 1) / 2) * y / rows
+            r = min(x / (2.1 * columns), y / (2.1 * rows))
             b.add(lathe([(r, 0.3 * z), (r, 0.94 * z), (0.8 * r, z)], 12).visual_only().at(px, py), red)
             b.add(cylinder(0.78 * r, 0.001, 12).visual_only().at(px, py, z), materials.metal("silver"))
     b.add(box(0.96 * x, 0.96 * y, 0.65 * z).collision_only().at(z=0.35 * z), red)
@@ -181,7 +191,7 @@ def can(
 
 CATEGORIES = [
     Entry("pop", can, (0.066, 0.066, 0.122), 0.37, 4, rest="standing"),
-    Entry("pop_case", case_of_cans, (0.200, 0.268, 0.125), 4.5, 3, vary=0.03, rest="standing"),
+    Entry("pop_case", case_of_cans, (0.200, 0.268, 0.125), 4.5, SIX_PACK, extra=1, vary=0.03, rest="standing"),
     Entry("jar", jar, (0.095, 0.095, 0.150), 0.42, 6, rest="upright"),
     Entry("jam", filled_jar, (0.072, 0.072, 0.092), 0.45, 3, rest="standing",
           options={"fills": ("dark_red", "orange", "purple")}),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
+from typing import Any
 
 import numpy as np
 
@@ -76,6 +77,30 @@ def swept(path: list, radii: list[float], sides: int = 10, hulls: int = 3) -> So
     for a, c in itertools.pairwise(edges):
         pieces.append(scaled[a : c + 1][:, ::2].reshape(-1, 3))
     return Solid((mesh,), tuple(pieces))
+
+
+SPRIG = 3
+"""Number of the first parsley that is a sprig, for a piece of cheese; only the object library has such."""
+
+
+def parsley(b: ObjectBuilder, **options: Any) -> None:
+    """A bunch; from number `SPRIG` on a sprig of it."""
+    if b.index >= SPRIG:
+        x, y, z = b.size
+        b.size, b.mass = (0.35 * x, 0.4 * y, 0.5 * z), 0.004
+    bunch(b, **options)
+
+
+SMALL = 4
+"""Number of the first pumpkin of a size for drawers; only the object library has such."""
+
+
+def pumpkin(b: ObjectBuilder, **options: Any) -> None:
+    """Large; from number `SMALL` on small, for decoration."""
+    if b.index >= SMALL:
+        x, y, z = b.size
+        b.size, b.mass = (0.6 * x, 0.6 * y, 0.6 * z), 0.9
+    ribbed(b, **options)
 
 
 def ribbed(b: ObjectBuilder, *, skins: tuple, ribs: int = 8, stem: str = "brown", depth: float = 0.12) -> None:
@@ -315,7 +340,7 @@ CATEGORIES = [
           options={"skins": ((0.78, 0.70, 0.48),), "stem": None, "depth": 0.4}),
     Entry("watermelon", round_fruit, (0.260, 0.340, 0.250), 7.0, 3, uniform=True,
           options={"skins": ((0.18, 0.40, 0.18), (0.30, 0.50, 0.24)), "stem": None, "depth": 0.5}),
-    Entry("pumpkin", ribbed, (0.260, 0.260, 0.220), 4.0, 4, rest="standing", uniform=True,
+    Entry("pumpkin", pumpkin, (0.260, 0.260, 0.220), 4.0, SMALL, extra=1, rest="standing", uniform=True,
           options={"skins": ("orange", (0.85, 0.42, 0.12))}),
     Entry("bell_pepper", ribbed, (0.080, 0.080, 0.100), 0.16, 4, rest="standing", uniform=True,
           options={"skins": ("red", "yellow", "green", "orange"), "ribs": 4, "stem": "leaf"}),
@@ -329,7 +354,7 @@ CATEGORIES = [
     Entry("celery", bunch, (0.330, 0.080, 0.060), 0.45, 3,
           options={"leafy": 0.25, "stem": (0.66, 0.80, 0.46), "count": 8}),
     Entry("green_onion", bunch, (0.300, 0.045, 0.022), 0.08, 3, options={"leafy": 0.5, "stem": "white", "bulb": True}),
-    Entry("parsley", bunch, (0.200, 0.110, 0.035), 0.04, 3, options={"leafy": 0.55, "count": 14}),
+    Entry("parsley", parsley, (0.200, 0.110, 0.035), 0.04, SPRIG, extra=1, options={"leafy": 0.55, "count": 14}),
     Entry("basil", bunch, (0.160, 0.100, 0.040), 0.03, 3,
           options={"leafy": 0.6, "count": 12, "leaf": (0.24, 0.54, 0.20)}),
     Entry("chives", bunch, (0.220, 0.030, 0.015), 0.02, 2, options={"leafy": 0.0, "count": 14, "stem": "leaf"}),

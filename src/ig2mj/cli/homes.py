@@ -178,9 +178,18 @@ def _convert_objects(
     failed: list[str],
 ) -> int:
     """Converts the object library; adds lines of failed checks to `failed`. How many models."""
+    import json
+
     from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.conversion import convert_object
-    from ig2mj_homes.dataset.object_library import ASSETS, FOLDER, is_fixed, library_models
+    from ig2mj_homes.dataset.object_library import (
+        ASSETS,
+        FOLDER,
+        PREFERRED_FILE,
+        is_fixed,
+        library_models,
+        preferred_models,
+    )
     from ig2mj_homes.dataset.ship import strip_report
 
     models = library_models(dataset)
@@ -190,6 +199,9 @@ def _convert_objects(
         options = ConvertOptions(assets=ASSETS, cache=cache, max_hulls=MAX_HULLS)
         convert_object(urdf, category, folder, model=model, fixed=is_fixed(category), options=options)
         failed += strip_report(folder, keep_checks=False)
+    if preferred := preferred_models(models):
+        text = json.dumps(preferred, indent=1, sort_keys=True) + "\n"
+        (out / FOLDER / PREFERRED_FILE).write_text(text, encoding="utf-8", newline="\n")
     return len(models)
 
 

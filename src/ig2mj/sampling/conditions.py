@@ -175,7 +175,9 @@ def order(
         last = rest[0] if condition.is_mutual and turn[rest[0]] > turn[first] else first
         where.setdefault(last, []).append(condition)
     placements = tuple(
-        (n, tuple(sorted(where[n], key=lambda c: (not c.value, c.predicate == "on_floor")))) for n in names if n in where
+        (n, tuple(sorted(where[n], key=lambda c: (not c.value, c.predicate == "on_floor"))))
+        for n in names
+        if n in where
     )
     rest = [c for c in conditions if not c.is_placement]
     return SamplingPlan(

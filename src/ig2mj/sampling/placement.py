@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
@@ -99,7 +99,7 @@ class PlacementArea:
       allowed: for cells (row, col of the world's grid), whether the object's origin may be there; None: all.
       push_towards: object that the placed one is pushed against before it is let go; -1: none.
       loose: where neither full support nor balance is found, physics may decide where the object comes to rest, as in a
-        bowl or a basket.
+        bowl or a basket; the supports are containers.
       holds_at_once: the predicate does not depend on contact, so that it can be asked before physics.
     """
 
@@ -283,6 +283,8 @@ class Placer:
         every = np.arange(cells.rows * cells.cols)
         if area.allowed is not None:
             every = every[area.allowed(cells.row + every // cells.cols, cells.col + every % cells.cols)]
+        if support == "loose" and area.loose:
+            every = every[self._over(shape, cells, area.supports).ravel()[every]]
         many = MANY_CELLS // max(int(shape.covered.sum()), 1)
         few = len(every) <= RANDOM_CELLS
         wanted = "balanced" if support == "loose" and not area.loose else support
@@ -310,6 +312,13 @@ class Placer:
             else:
                 rejected["not supported"] += 1
         return Rest(*(getattr(rest, f.name)[good] for f in dataclasses.fields(Rest)))
+
+    def _over(self, shape: Footprint, cells: ColumnWindow, containers: Sequence[int]) -> Bool[np.ndarray, "R C"]:
+        """Cells of the origin where the object's centre of mass is above or below a part of a container: not next to a
+        round one, in a corner of its box."""
+        col, row = np.rint(shape.centre / CELL).astype(int).tolist()
+        window = ColumnWindow(cells.row + row, cells.col + col, cells.rows, cells.cols)
+        return np.any([self.query.covered(c, window) for c in containers], axis=0)
 
     def _let_go(self, task: _Task, pos: np.ndarray, quat: np.ndarray, area: PlacementArea, support: str) -> str:
         """Puts the object there and lets physics settle; the reason why that is no good, or ''."""

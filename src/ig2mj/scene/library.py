@@ -1,7 +1,8 @@
 """Models of objects on disk that can be added to any home when it is loaded.
 
 The object library that ships is scenes_mjcf/objects/<category>/<model>/, with meshes and textures shared with the
-homes. Libraries of one's own are folders that hold what `ig2mj convert object` wrote (`ig2mj.scene.own_libraries`), and
+homes; its file preferred.json names the models that a category alone stands for, where that is not the first by name.
+Libraries of one's own are folders that hold what `ig2mj convert object` wrote (`ig2mj.scene.own_libraries`), and
 a single folder of that kind can be named itself.
 """
 
@@ -25,6 +26,7 @@ from ig2mj.scene.physics_digest import physics_digest
 FOLDER = "objects"
 MODEL_FILE = "object.xml"
 SCENE_FILE = "scene.xml"
+PREFERRED_FILE = "preferred.json"
 
 ROBOT = "agent"
 """Category of robots that `ig2mj convert robot` wrote."""
@@ -87,11 +89,19 @@ class LibraryModel:
 
 @functools.cache
 def library() -> dict[str, dict[str, LibraryModel]]:
-    """The library that ships: category -> model name -> model, sorted. Empty where no homes were shipped."""
+    """The library that ships: category -> model name -> model, sorted, but the preferred model of a category first.
+
+    Empty where no homes were shipped.
+    """
+    file = paths.SHIPPED_HOMES / FOLDER / PREFERRED_FILE
+    preferred: dict[str, str] = msgspec.json.decode(file.read_bytes(), type=dict[str, str]) if file.is_file() else {}
     found: dict[str, dict[str, LibraryModel]] = {}
     for file in sorted((paths.SHIPPED_HOMES / FOLDER).glob(f"*/*/{MODEL_FILE}")):
         category, model = file.parts[-3:-1]
         found.setdefault(category, {})[model] = LibraryModel(category, model, file.parent)
+    for category, first in preferred.items():
+        if first in found.get(category, ()):
+            found[category] = {first: found[category][first], **found[category]}
     return found
 
 

@@ -172,7 +172,9 @@ def choose_reading(
         if truth[atom] == value or len(atom.arguments) == 1:
             return True
         first, second = atom.arguments
-        if first == second or (first in fixed and (second in fixed or atom.predicate not in ("next_to", "in_contact_with"))):
+        if first == second or (
+            first in fixed and (second in fixed or atom.predicate not in ("next_to", "in_contact_with"))
+        ):
             return False
         return True
 
