@@ -27,9 +27,9 @@ PACKED = ("jeans", "pumpkin", "stocking", "sweater", "t-shirt", "teapot")
 """What activities pack, or put something into: folded, small or hollow from model 4 on."""
 
 MODELS = {
-    "carton": (2,),
+    "carton": (5, 2),
     "casserole": (4, 0),
-    "rag": (5, 0),
+    **dict.fromkeys(("dishtowel", "rag"), (5, 0)),
     "shelf": (14,),
     **dict.fromkeys(("parsley", "pop_case", "salad"), (3, 0)),
     **dict.fromkeys(PACKED, (4, 0)),
@@ -38,7 +38,7 @@ MODELS = {
     "carving_knife": (0, 1, 2, 4, 5, 6),
 }
 """Numbers of the models where it is not the first alone; the first here is the one that the category's name stands for
-(`PREFERRED_FILE`). The roomiest carton holds what activities pack; casserole 4 is an empty dish, salad 3 lies on a plate;
+(`PREFERRED_FILE`). Carton 5 holds what activities pack; casserole 4 is an empty dish, salad 3 lies on a plate;
 the shelf is a board for a wall, which no home has; the last three bath towels are rolled and the last three carving
 knives stand on their handles, for hands to which nothing sticks."""
 

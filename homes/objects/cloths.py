@@ -17,7 +17,10 @@ ROLLED = 5
 """Number of the first rolled bath towel. Only the object library has such."""
 
 FOLDED = 5
-"""Number of the first folded rag; likewise."""
+"""Number of the first rag and dishtowel that are folded in four; likewise."""
+
+RAG_DENSITY = 40.0
+"""kg/m^3 of the box around a rag or dishtowel, spread out or folded."""
 
 ROLLED_DENSITY = 330.0
 """kg/m^3 of a cloth that is tightly rolled up; folded, a category's mean applies to the box around it."""
@@ -60,12 +63,12 @@ def folded(b: ObjectBuilder, *, layers: int = 4, kind: str | None = None, wipes:
 
 
 def rag(b: ObjectBuilder, **options: Any) -> None:
-    """Spread out; from number `FOLDED` on folded in four, so that it goes into a bucket."""
+    """Spread out; from number `FOLDED` on folded in four, so that it goes into a bucket or a box."""
     if b.index < FOLDED:
         spread(b, **options)
         return
     x, y, z = b.size
-    b.mass = 0.05
+    b.mass = RAG_DENSITY * x * y * z
     b.size = (x / 2, y / 2, 2 * z)
     folded(b, **options)
 
@@ -153,7 +156,7 @@ def mat(b: ObjectBuilder) -> None:
 
 
 CATEGORIES = [
-    Entry("dishtowel", spread, (0.450, 0.300, 0.014), 0.08, 5, vary=0.1, options={"wipes": True}),
+    Entry("dishtowel", rag, (0.450, 0.300, 0.014), 0.08, FOLDED, extra=1, vary=0.1, options={"wipes": True}),
     Entry("hand_towel", folded, (0.200, 0.280, 0.040), 0.18, 5, options={"wipes": True}),
     Entry("bath_towel", bath_towel, (0.300, 0.360, 0.090), 0.55, ROLLED, extra=3, options={"wipes": True, "layers": 5}),
     Entry("rag", rag, (0.320, 0.280, 0.018), 0.05, FOLDED, extra=1, vary=0.12, options={"wipes": True}),

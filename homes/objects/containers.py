@@ -60,8 +60,17 @@ def basket(b: ObjectBuilder) -> None:
     b.add(tube(path, 0.009, 6, hulls=3), wicker)
 
 
+ROOMY = 5
+"""Number of the first carton for removals; only the object library has such."""
+
+ROOMY_SIZE = (0.400, 0.520, 0.360)
+"""m."""
+
+
 def carton(b: ObjectBuilder) -> None:
-    """A cardboard box, hollow, with two flaps on top; the flaps meet in the middle."""
+    """A cardboard box, hollow, with two flaps on top; the flaps meet in the middle. From number `ROOMY` on large."""
+    if b.index >= ROOMY:
+        b.size, b.mass = ROOMY_SIZE, 1.0
     x, y, z = b.size
     card = materials.picture(
         "cardboard", textures.speckle(materials.tint("cardboard", b.rng), b.rng, 0.06), 0.3, "cardboard"
@@ -277,7 +286,7 @@ CATEGORIES = [
     Entry("trash_can", trash_can, (0.290, 0.290, 0.340), 1.4, 6, rest="upright", vary=0.12),
     Entry("bucket", bucket, (0.290, 0.290, 0.270), 0.9, 4, rest="upright", uniform=True),
     Entry("basket", basket, (0.300, 0.400, 0.330), 0.8, 5, rest="upright", vary=0.1),
-    Entry("carton", carton, (0.320, 0.420, 0.300), 0.7, 5, rest="upright", vary=0.15),
+    Entry("carton", carton, (0.320, 0.420, 0.300), 0.7, ROOMY, extra=1, rest="upright", vary=0.15),
     Entry("chest", chest, (0.480, 0.800, 0.480), 10.0, 4, rest="upright", vary=0.1),
     Entry("pencil_box", small_box, (0.085, 0.210, 0.040), 0.14, 3, rest="upright"),
     Entry("package", parcel, (0.220, 0.300, 0.130), 0.6, 4, rest="upright", vary=0.12),

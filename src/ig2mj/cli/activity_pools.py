@@ -23,6 +23,7 @@ def sample(
     scene: Annotated[str | None, tyro.conf.arg(metavar="HOME")] = None,
     count: int = 16,
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
+    goal: Flag = False,
     seed: int = 0,
     jobs: int = 0,
     cluster: Cluster = None,
@@ -30,17 +31,18 @@ def sample(
     behavior1k: Flag = False,
     json: Flag = False,
 ) -> int:
-    """Sample initial states of an activity, and write them as a pool for batched resets.
+    """Sample initial states of an activity, or goal states, and write them as a pool for batched resets.
 
-    The exit status is 0 only if every row was sampled; otherwise the reasons for failure are counted. Rows in which
-    the goal already holds are listed.
+    The exit status is 0 only if every row was sampled; otherwise the reasons for failure are counted. Rows of initial
+    states in which the goal already holds are listed.
 
     Args:
       name: the activity's name, or a BDDL file of your own.
       scene: the home; default: the shipped home that needs the fewest additional objects and where a start can be
         sampled.
       count: number of rows.
-      out: output file; default: NAME.npz in the working directory.
+      out: output file; default: NAME.npz in the working directory, NAME-goal.npz for goal states.
+      goal: sample states in which the goal holds, each from the initial state with the same seed and row.
       seed: the same seed gives the same pool.
       jobs: number of processes; 0: one per processor.
       cluster: run on a Ray cluster: its address, or auto.
@@ -52,7 +54,8 @@ def sample(
     from ig2mj.cli.common.files import check_output
     from ig2mj.errors import Ig2mjError
     from ig2mj.tasks.bddl.definitions import load_activity
-    from ig2mj.tasks.bddl.start import first_that_works, fitting, sample_start
+    from ig2mj.tasks.bddl.goal_states import sample_goals
+    from ig2mj.tasks.bddl.start import SampledStart, first_that_works, fitting, sample_start
     from ig2mj.worlds.pool import save_pool
 
     if count < 1:
@@ -60,7 +63,7 @@ def sample(
     if jobs < 0:
         raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
     activity = load_activity(name, behavior1k)
-    file = out or pathlib.Path(f"{activity.name}.npz")
+    file = out or pathlib.Path(f"{activity.name}-goal.npz" if goal else f"{activity.name}.npz")
     check_output(file)
     where = where_of(jobs, cluster, resume)
     bound, errors = fitting(activity, find_homes(scene))
@@ -68,22 +71,30 @@ def sample(
         raise Ig2mjError(" ".join(line.strip() for line in binding_as_text(None, [], errors)))
     binding, loaded = first_that_works(bound, seed, scene)
     request = {"command": "activity sample", "activity": name, "scene": loaded.digest, "rows": count, "seed": seed}
+    if goal:
+        request["goal"] = True
     with opened(file, request, where) as journal, follow(f"sampling in {loaded.name}") as report:
-        done = sample_start(binding, loaded, count, seed, where=where, journal=journal, progress=report)
+        if goal:
+            options = {"name": name, "where": where, "journal": journal, "progress": report}
+            goals = sample_goals(binding, loaded, count, seed, **options)
+            done = SampledStart(goals, tuple(range(len(goals.rows))))
+        else:
+            done = sample_start(binding, loaded, count, seed, where=where, journal=journal, progress=report)
         if done.sampled.pool is not None:
             note = {"activity": name, "behavior1k": behavior1k, "seed": seed, "rows": list(done.sampled.rows)}
+            note |= {"goal": True} if goal else {}
             save_pool(done.sampled.pool, file, loaded, note)
         if not done.sampled.failed:
             journal.finish()
     tell_failures(done.sampled.failed, count)
     show = ["ig2mj activity show", shlex.quote(name), "--pool", shlex.quote(str(file))]
     show += [*(["--behavior1k"] if behavior1k else []), *(["--scene", shlex.quote(scene)] if scene else [])]
-    _tell(done, binding, file, json, " ".join(show))
+    _tell(done, binding, file, json, " ".join(show), goal)
     return 0 if done.sampled.complete else 1
 
 
-def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: bool, show: str) -> None:
-    """`show`: the command that shows the pool's rows."""
+def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: bool, show: str, goal: bool) -> None:
+    """`show`: the command that shows the pool's rows. `goal`: they are goal states."""
     import sys
 
     from ig2mj.cli.common.printing import make_table, print_json, stdout_console
@@ -105,12 +116,13 @@ def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: boo
         print_json(result)
         return
     if sampled.pool is not None:
+        what = "goal states" if goal else "starts"
         print(
-            f"{file}: {len(sampled.rows)} of {sampled.requested} starts of {binding.activity.name} in {binding.home}, "
+            f"{file}: {len(sampled.rows)} of {sampled.requested} {what} of {binding.activity.name} in {binding.home}, "
             f"{len(binding.additions)} objects added, {sampled.seconds:.1f} s\n"
             f"look: {show} --row 0 --image row.png"
         )
-    if done.reached:
+    if done.reached and not goal:
         print(f"the goal already holds in rows {', '.join(map(str, done.reached))}", file=sys.stderr)
     lacking = sampled.requested - len(sampled.rows) - len(sampled.failed)
     if lacking:

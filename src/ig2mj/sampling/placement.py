@@ -95,7 +95,7 @@ class PlacementArea:
     Attributes:
       low, high: x and y between which the object's origin comes to lie, metres.
       height: world z from which surfaces are looked for downwards.
-      supports: objects that may bear it.
+      supports: objects that may bear it. contents: further ones, where full support by `supports` is not found.
       allowed: for cells (row, col of the world's grid), whether the object's origin may be there; None: all.
       push_towards: object that the placed one is pushed against before it is let go; -1: none.
       loose: where neither full support nor balance is found, physics may decide where the object comes to rest, as in a
@@ -111,6 +111,7 @@ class PlacementArea:
     push_towards: int = -1
     loose: bool = False
     holds_at_once: bool = False
+    contents: tuple[int, ...] = ()
 
 
 Areas = Callable[[Footprint, np.random.Generator], Iterator[PlacementArea]]
@@ -288,6 +289,7 @@ class Placer:
         many = MANY_CELLS // max(int(shape.covered.sum()), 1)
         few = len(every) <= RANDOM_CELLS
         wanted = "balanced" if support == "loose" and not area.loose else support
+        supports = area.supports if support == "full" else (*area.supports, *area.contents)
         rest, good = _none(), np.zeros(0, bool)
         for first in (True, False):
             if first and not few:
@@ -295,17 +297,17 @@ class Placer:
             else:
                 chosen = every
                 if len(chosen) > many:
-                    possible = possible_origins(level, shape, area.supports, cells.rows, cells.cols, wanted == "full")
+                    possible = possible_origins(level, shape, supports, cells.rows, cells.cols, wanted == "full")
                     chosen = chosen[possible.ravel()[chosen]]
                 if len(chosen) > many:
                     chosen = rng.choice(chosen, many, replace=False)
             row, col = cells.row + chosen // cells.cols, cells.col + chosen % cells.cols
-            rest = rest_at(level, shape, row, col, area.supports, wanted)
+            rest = rest_at(level, shape, row, col, supports, wanted)
             good = {"full": rest.full, "balanced": rest.balanced, "loose": rest.clear}[wanted]
             if good.any() or few:
                 break
         if not good.any():
-            if not len(every) or not np.isin(level.owner, area.supports).any():
+            if not len(every) or not np.isin(level.owner, supports).any():
                 rejected["no surface"] += 1
             elif not rest.clear.any():
                 rejected["no room"] += 1

@@ -1,8 +1,10 @@
 """One initial state that fulfils a set of conditions: objects are placed one after another, with backtracking.
 
 Order: joints (those of an object that is to be placed, once it stands), cuts of wholes whose halves are to be placed,
-placements from supports to the objects on them, then states without a placement. If an object finds no position, the sampler backtracks to the one before it. At
-the end all conditions are checked together: they hold, everything sleeps, no object penetrates another."""
+placements from supports to the objects on them, then states without a placement. If an object finds no position, the
+sampler backtracks to the one before it. At the end all conditions are checked together: they hold, everything sleeps,
+no object penetrates another.
+"""
 
 from __future__ import annotations
 

@@ -14,11 +14,17 @@ HEIGHTS = 6
 """Heights that are tried for one orientation, spread evenly over b's box: every shelf and drawer is a level."""
 
 
-def areas(query: SceneQuery, _: int, container: int) -> Areas:
+def areas(query: SceneQuery, placed: int, container: int) -> Areas:
     """The rule for putting something into `container`."""
+
+    tables = query.scene.tables
+    loose = ~tables.object_fixed & ~tables.object_parked
+    loose[[container, placed]] = False
 
     def inside(shape: Footprint, rng: np.random.Generator) -> Iterator[PlacementArea]:
         low, high = query.box(container)
+        com = np.asarray(query.view.object_com[0])
+        held = loose & ((com > low) & (com < high)).all(-1)
         layer = (np.arange(HEIGHTS) + rng.uniform(size=HEIGHTS)) / HEIGHTS
         for part in rng.permutation(layer):
             yield PlacementArea(
@@ -28,6 +34,7 @@ def areas(query: SceneQuery, _: int, container: int) -> Areas:
                 (container,),
                 loose=True,
                 holds_at_once=True,
+                contents=tuple(np.flatnonzero(held).tolist()),
             )
 
     return inside

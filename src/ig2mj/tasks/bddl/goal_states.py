@@ -9,30 +9,34 @@ from __future__ import annotations
 
 import collections
 import dataclasses
+import functools
+import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import jax
 import numpy as np
 
 from ig2mj.callbacks import ProgressCallback, no_progress
-from ig2mj.cluster.job_runner import Where, map_jobs
-from ig2mj.cluster.jobs import Job, JobSet
+from ig2mj.cluster.job_runner import Where
+from ig2mj.cluster.jobs import Job, JobSet, WholeRunError
 from ig2mj.cluster.journal import Journal
 from ig2mj.errors import EngineError, StateError
-from ig2mj.predicates import logic
 from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.readings import Literals, fewest_changes, readings
 from ig2mj.process import entry_point
-from ig2mj.sampling.conditions import Condition
-from ig2mj.sampling.many import make_sampler, packed_row, sample_row, sampled_rows, Sampled
+from ig2mj.sampling.conditions import MUTUAL, Condition
+from ig2mj.sampling.many import Sampled, make_sampler, packed_row, sample_row, sampled_rows
 from ig2mj.sampling.placement import Budget, Rejections
 from ig2mj.sampling.row import Row, RowSampler
+from ig2mj.sampling.scene_refs import check_of, named, scene_named
+from ig2mj.scene.manifest import load_manifest
+from ig2mj.scene.paths import scene_folder
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
-from ig2mj.tasks.bddl.binding import Binding
+from ig2mj.tasks.bddl.binding import Binding, bind
+from ig2mj.tasks.bddl.definitions import load_activity
 from ig2mj.tasks.bddl.goal import conditions
 from ig2mj.tasks.bddl.start import start_conditions, world_of
 
@@ -42,14 +46,88 @@ ATTEMPTS = 12
 ATTEMPT_BUDGET = 400
 """Units of work (see `ig2mj.sampling.placement.Budget`) of one attempt."""
 
-SEARCHED = 200
-"""Readings that are looked at for one whose objects are in one place each."""
-
 STREAM = 1
 """Of random numbers, next to that of starts."""
 
 ELSEWHERE = ("inside", "on_top", "on_floor")
 """Predicates of which an object fulfils one at a time, and of one second argument."""
+
+
+def sample_goals(
+    binding: Binding,
+    scene: Scene,
+    count: int,
+    seed: int = 0,
+    *,
+    name: str | None = None,
+    first: int = 0,
+    jobs: int = 1,
+    seconds: float = math.inf,
+    progress: ProgressCallback = no_progress,
+    where: Where | None = None,
+    journal: Journal | None = None,
+) -> Sampled:
+    """Samples goal states: row n is reached from row n of `ig2mj.tasks.bddl.start.sample_start` with the same seed.
+
+    Args:
+      scene: as `ig2mj.tasks.bddl.start.load_bound` gives it. count, first, jobs, where, journal, progress: as of
+        `ig2mj.sampling.many.sample`.
+      name: what `load_activity` finds the activity by, where that is not its name but a file; every machine of a
+        cluster must have it.
+      seconds: processor time for each goal state; it makes results depend on the machine's speed.
+
+    Raises:
+      StateError: no reading of the goal can be made true. EngineError: the scene does not come to rest.
+      ClusterError: see `ig2mj.cluster.job_runner.map_jobs`.
+    """
+    activity = binding.activity
+    common = {
+        **named(scene),
+        "activity": name or activity.name,
+        "behavior1k": activity.behavior_1k,
+        "seed": seed,
+        "seconds": None if math.isinf(seconds) else seconds,
+    }
+    work = JobSet(
+        "ig2mj.tasks.bddl.goal_states:goal_job",
+        f"sampling goals of {activity.name} in {scene.name}",
+        [Job(f"row_{n:06d}", {**common, "number": n}) for n in range(first, first + count)],
+        check=check_of(scene),
+    )
+    try:
+        return sampled_rows(scene, work, first, where or Where(jobs), journal, progress)
+    finally:
+        _sampler.cache_clear()
+
+
+@entry_point
+def goal_job(
+    scene: str,
+    objects: Sequence[str],
+    activity: str,
+    behavior1k: bool,
+    seed: int,
+    seconds: float | None,
+    number: int,
+) -> bytes:
+    """One goal state, packed (`ig2mj.sampling.many.packed_row`); no arrays where none was found."""
+    with jax.default_device(jax.local_devices(backend="cpu")[0]):  # one world, and the same rows with and without a GPU
+        try:
+            sampler = _sampler(scene, tuple(objects), activity, behavior1k)
+        except (EngineError, StateError) as e:
+            raise WholeRunError(e) from e
+        start, rejected = sampler.start(seed, number)
+        if start is None:
+            return packed_row(None, {f"start: {reason}": n for reason, n in rejected.items()})
+        found = sampler.goal(start, seed, number, math.inf if seconds is None else seconds)
+    return packed_row(found.row, found.rejected)
+
+
+@functools.lru_cache(maxsize=1)
+def _sampler(scene: str, objects: tuple[str, ...], activity: str, behavior1k: bool) -> GoalSampler:
+    loaded = scene_named(scene, objects)
+    binding = bind(load_activity(activity, behavior1k), load_manifest(scene_folder(scene)))
+    return GoalSampler(binding, loaded)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,7 +136,7 @@ class GoalState:
 
     Attributes:
       row: the goal state; None: not found. rejected: why candidates were turned down. attempts: how many were made.
-      reading: the last one tried. missing: literals of it that could not be made true, as far as is known.
+      reading: conditions of the last one tried.
     """
 
     row: Row | None
@@ -82,6 +160,12 @@ class GoalSampler:
         """Of the scene."""
         return self.sampler.model
 
+    def compile(self) -> None:
+        """Compiles the predicates of start and goal; else the first start and the first goal do."""
+        world = world_of(self.sampler.query, self._scene_start[1])
+        self._goal.literals_of(world)
+        self.sampler.holds(self._start, self._scene_start[1])
+
     def start(self, seed: int, number: int) -> tuple[Row | None, Rejections]:
         """A start state by its number, as `ig2mj.tasks.bddl.start.sample_start` gives it."""
         self.sampler.start_from(*self._scene_start)
@@ -94,7 +178,8 @@ class GoalSampler:
           seed, number: of the random stream. seconds: processor time after which no attempt begins; it makes results
             depend on the machine's speed.
         """
-        sampler, rejected = self.sampler, collections.Counter()
+        sampler = self.sampler
+        rejected: Rejections = collections.Counter()
         sampler.query.load(start.physics)
         sampler.start_from(start.physics, start.states)
         truth = self._truth(start)
@@ -172,22 +257,20 @@ def choose_reading(
         if truth[atom] == value or len(atom.arguments) == 1:
             return True
         first, second = atom.arguments
-        if first == second or (
-            first in fixed and (second in fixed or atom.predicate not in ("next_to", "in_contact_with"))
-        ):
-            return False
-        return True
+        return first != second and (first not in fixed or (atom.predicate in MUTUAL and second not in fixed))
 
     def in_one_place(chosen: Mapping[Atom, bool], atom: Atom, value: bool) -> bool:
         if not possible(chosen, atom, value):
             return False
         if not value or atom.predicate not in ELSEWHERE:
             return True
-        for other, held in chosen.items():
-            if held and other.predicate in ELSEWHERE and other.arguments[0] == atom.arguments[0]:
-                if other.predicate == atom.predicate or "on_floor" in (other.predicate, atom.predicate):
-                    return False
-        return True
+        return not any(
+            held
+            and other.predicate in ELSEWHERE
+            and other.arguments[0] == atom.arguments[0]
+            and (other.predicate == atom.predicate or "on_floor" in (other.predicate, atom.predicate))
+            for other, held in chosen.items()
+        )
 
     for accepts in (in_one_place, possible):
         found = next(readings(goal.ground, accepts, rank), None)
