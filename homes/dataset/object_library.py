@@ -23,12 +23,11 @@ PLACED = ("car", "christmas_tree", "christmas_tree_decorated", "grill", "paintin
 VARIED = ("apple", "bath_towel", "carving_knife", "cauldron", "hand_towel", "notebook", "steak")
 """What the six activities are about: three models of each."""
 
-PACKED = ("jeans", "pumpkin", "stocking", "sweater", "t-shirt", "teapot")
-"""What activities pack, or put something into: folded, small or hollow from model 4 on."""
+PACKED = ("backpack", "casserole", "jeans", "pumpkin", "stocking", "sweater", "t-shirt", "teapot", "underwear")
+"""What activities pack, or put something into: folded, small, large or hollow from model 4 on."""
 
 MODELS = {
     "carton": (5, 2),
-    "casserole": (4, 0),
     **dict.fromkeys(("dishtowel", "rag"), (5, 0)),
     "shelf": (14,),
     **dict.fromkeys(("parsley", "pop_case", "salad"), (3, 0)),

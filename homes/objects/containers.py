@@ -187,8 +187,18 @@ def _shell(x: float, y: float, z: float, wall: float) -> Solid:
     return tray(x, y, z, wall).mirrored("z").at(z=z)
 
 
+LARGE = 4
+"""Number of the first backpack for a journey; only the object library has such."""
+
+LARGE_SIZE = (0.290, 0.340, 0.470)
+"""m."""
+
+
 def backpack(b: ObjectBuilder) -> None:
-    """A standing rucksack: hollow body, front pocket, straps at the rear, a top flap hinged at the back."""
+    """A standing rucksack: hollow body, front pocket, straps at the rear, a top flap hinged at the back. From number
+    `LARGE` on large."""
+    if b.index >= LARGE:
+        b.size, b.mass = LARGE_SIZE, 1.2
     x, y, z = b.size
     cloth = materials.fabric(b.pick(("navy", "red", "dark_green", "grey", "teal")), b.rng)
     dark = materials.plain("black", "fabric")
@@ -291,7 +301,7 @@ CATEGORIES = [
     Entry("pencil_box", small_box, (0.085, 0.210, 0.040), 0.14, 3, rest="upright"),
     Entry("package", parcel, (0.220, 0.300, 0.130), 0.6, 4, rest="upright", vary=0.12),
     Entry("briefcase", briefcase, (0.340, 0.420, 0.110), 2.0, 4, rest="upright"),
-    Entry("backpack", backpack, (0.220, 0.300, 0.430), 0.9, 4, rest="upright"),
+    Entry("backpack", backpack, (0.220, 0.300, 0.430), 0.9, LARGE, extra=1, rest="upright"),
     Entry("duffel_bag", soft_bag, (0.260, 0.520, 0.330), 1.0, 4, rest="upright"),
     Entry("shoulder_bag", soft_bag, (0.110, 0.300, 0.420), 0.7, 3, rest="upright", options={"roll": False}),
     Entry("paper_bag", paper_bag, (0.150, 0.250, 0.320), 0.06, 4, rest="upright", vary=0.1),

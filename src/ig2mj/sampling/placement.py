@@ -196,6 +196,7 @@ class Placer:
         budget: Budget,
         rejected: Rejections,
         along: int = -1,
+        flat: bool = False,
     ) -> bool:
         """Puts an object into an area so that `truth` holds afterwards; leaves the world as it was where it cannot.
 
@@ -203,6 +204,7 @@ class Placer:
           areas: see `Areas`. truth: asked after the object has settled. rejected: counts are added to it.
           along: an object with whose sides every second orientation is aligned, so that a pillow finds its place in a
             cabinet that it all but fills; -1: all are turned by any angle.
+          flat: of its stable orientations, the object takes one in which it is lowest, so that it can bear something.
         """
         before = self.query.save()
         task = _Task(object_index, truth, rng, budget, rejected, before, Bystanders(self.query, before))
@@ -213,7 +215,8 @@ class Placer:
                 break
             support = SUPPORT[min(draw * len(SUPPORT) // FIRST_DRAWS, len(SUPPORT) - 1)]
             aligned = along if draw % 2 else -1
-            quat, shift = self._orientation(object_index, rng, aligned), rng.uniform(-CELL / 2, CELL / 2, 2)
+            quat = self._orientation(object_index, rng, aligned, flat)
+            shift = rng.uniform(-CELL / 2, CELL / 2, 2)
             if container and support == "loose" and draw // 2 % 2:
                 quat = _tipped(quat, rng, np.asarray(self.query.view.object_quat[0, aligned]) if aligned >= 0 else None)
             shape = self.query.footprint(object_index, quat, shift)
@@ -382,11 +385,16 @@ class Placer:
             self.query.place(object_index, pos, quat)
         return pos
 
-    def _orientation(self, object_index: int, rng: np.random.Generator, along: int) -> Float[np.ndarray, "4"]:
+    def _orientation(
+        self, object_index: int, rng: np.random.Generator, along: int, flat: bool
+    ) -> Float[np.ndarray, "4"]:
         """A stable orientation drawn by its probability, turned about the vertical: by any angle, or as `along` is."""
         quats, prob = self._orientations[object_index]
         if quats is None:
             quat = np.array(self.query.view.object_quat[0, object_index], float)
+        elif flat:
+            shapes = [self.query.footprint(object_index, q, np.zeros(2)) for q in quats]
+            quat = quats[int(np.argmin([shape.high - shape.low for shape in shapes]))]
         else:
             quat = quats[rng.choice(len(prob), p=prob)]
         angle = rng.uniform(-np.pi, np.pi)

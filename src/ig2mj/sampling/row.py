@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import collections
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import jax
 import numpy as np
@@ -93,13 +93,14 @@ class RowSampler:
         budget: Budget,
         rejected: Rejections,
         keep: bool = False,
+        again: Collection[str] = (),
     ) -> Row | None:
         """A row, or None where the budget did not suffice; the world is left in it.
 
         Args:
           conditions: of objects' names (see `conditions.bind`). rejected: counts of reasons are added to it.
           keep: leave objects as they are of which everything holds already, and place larger objects first; else every
-            object is placed again.
+            object is placed again. again: objects that are placed again nevertheless, on their flattest side.
 
         Raises:
           StateError, AbilityError, UnknownNameError: a condition that can never be made true.
@@ -107,7 +108,7 @@ class RowSampler:
         plan = order(conditions, self._fixed, self._ranks if keep else None)
         self._truths_of(tuple(conditions))  # refuses what can never hold
         self.query.load(self._start)
-        self._states, self._keep = self._initial, keep
+        self._states, self._keep, self._again = self._initial, keep, frozenset(again)
         self._others = Bystanders(self.query, self._start)
         placed = {name for name, wanted in plan.placements if wanted[0].value}
         self._joints = [c for c in plan.joints if c.arguments[0] in placed]
@@ -183,7 +184,7 @@ class RowSampler:
         """Places one object, if it is not where it shall be already and negations are all that is asked."""
         index = object_index(self.model, name)
         rule = wanted[0]
-        if self._keep and self._holds(wanted):
+        if self._keep and name not in self._again and self._holds(wanted):
             return True
         if self.model.tables.object_fixed[index]:
             if self._holds(wanted):
@@ -196,7 +197,8 @@ class RowSampler:
         along = -1
         if rule.value and rule.predicate != "on_floor":
             along = object_index(self.model, rule.other_than(name))
-        if not self._placer.place(index, areas, lambda: self._holds(wanted), rng, budget, rejected, along):
+        flat = name in self._again
+        if not self._placer.place(index, areas, lambda: self._holds(wanted), rng, budget, rejected, along, flat):
             return False
         opened = [c for c in self._joints if c.arguments[0] == name]
         if all(self._open(c, rng, rejected) for c in opened) and (not opened or self._holds(wanted)):

@@ -196,7 +196,11 @@ class GoalSampler:
                 rejected["no reading of the goal is possible"] += 1
                 break
             reading = self._conditions(literals)
-            row = sampler.sample(reading, rng, Budget(ATTEMPT_BUDGET, left, time.process_time), rejected, keep=True)
+            wanted, again = reading, ()
+            if attempt % 2 == 0:
+                wanted, again = self._with_help(reading)
+            budget = Budget(ATTEMPT_BUDGET, left, time.process_time)
+            row = sampler.sample(wanted, rng, budget, rejected, keep=True, again=again)
             if row is not None and self._goal(world_of(sampler.query, row.states))[0]:
                 return GoalState(row, rejected, attempt, reading)
             if row is not None:
@@ -210,6 +214,25 @@ class GoalSampler:
           truth: of the goal's atoms in the start. cheapest: alternatives that change least come first.
         """
         return choose_reading(self._goal, truth, rng, cheapest, self._fixed)
+
+    def _with_help(self, reading: tuple[Condition, ...]) -> tuple[tuple[Condition, ...], tuple[str, ...]]:
+        """A reading with what makes it easier: containers stand open, and loose supports are put down flat.
+
+        Returns:
+          Conditions, and objects that must be placed again.
+        """
+        tables = self.model.tables
+        openable = {tables.object_names[o] for o in tables.openable_object}
+        said = {c.arguments[0] for c in reading if c.predicate == "open"}
+        placed = {c.arguments[0] for c in reading if c.is_placement and c.value}
+        needed = [
+            c for c in reading if c.value and c.is_placement and not self.sampler.holds((c,), self.sampler.start[1])
+        ]
+        inside = {c.arguments[1] for c in needed if c.predicate == "inside"} & openable - said
+        found = [Condition("open", (name,)) for name in sorted(inside)]
+        bearing = {c.arguments[1] for c in needed if c.predicate == "on_top"} - self._fixed - placed
+        where = [c for c in self._start if c.is_placement and c.value and c.arguments[0] in bearing]
+        return (*reading, *found, *where), tuple({c.arguments[0]: None for c in where})
 
     @property
     def _fixed(self) -> frozenset[str]:
