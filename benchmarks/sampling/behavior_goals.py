@@ -6,7 +6,7 @@
 
 A seed is a start state and a goal state that is reached from it (`ig2mj.tasks.bddl.goal_states`). The goal state has
 30 s of processor time. The home is the one in which `behavior_starts` sampled starts. Loading the scene and compiling
-its predicates come before, once for all seeds (`preparing`). Each activity is a process of its own, `--jobs` at a time.
+its predicates come before, once for all seeds (`preparing`). `--jobs` processes measure an activity each at a time.
 An activity is one file, benchmarks/results/behavior100/goals/<activity>.json.
 """
 
@@ -34,6 +34,8 @@ SECONDS = 30.0
 """Processor time that a goal state may take."""
 ENOUGH = 0.8
 """Share of seeds with which an activity counts as reachable."""
+ACTIVITIES = 8
+"""Activities that a process measures, one after another; a fresh one has none of their memory."""
 REASONS = 3
 """Reasons of failure in a row of the page."""
 
@@ -60,7 +62,7 @@ def main() -> None:
     made_by = {**provenance(), "seconds": args.seconds}
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(
-        args.jobs or os.cpu_count(), context, initializer=quiet, max_tasks_per_child=1
+        args.jobs or os.cpu_count(), context, initializer=quiet, max_tasks_per_child=ACTIVITIES
     ) as pool:
         running = {pool.submit(work, name, made_by=made_by): name for name in names}
         for done in concurrent.futures.as_completed(running):

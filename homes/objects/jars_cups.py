@@ -150,18 +150,18 @@ def pills(b: ObjectBuilder) -> None:
     b.add(*band(0.9 * r, 0.12 * z, 0.62 * z, materials.plain("paper", "paper")))
 
 
-SIX_PACK = 3
-"""Number of the first case of six cans, which goes into a bucket; only the object library has such."""
+FOUR_PACK = 3
+"""Number of the first pack of four small cans, which goes into a bucket; only the object library has such."""
 
-SIX_PACK_SIZE = (0.134, 0.200, 0.125)
+FOUR_PACK_SIZE = (0.096, 0.096, 0.092)
 """m."""
 
 
 def case_of_cans(b: ObjectBuilder) -> None:
-    """A cardboard tray with a block of cans under film: twelve, from number `SIX_PACK` on six."""
+    """A cardboard tray with a block of cans under film: twelve, from number `FOUR_PACK` on four."""
     columns, rows = 3, 4
-    if b.index >= SIX_PACK:
-        b.size, b.mass, columns, rows = SIX_PACK_SIZE, 2.25, 2, 3
+    if b.index >= FOUR_PACK:
+        b.size, b.mass, columns, rows = FOUR_PACK_SIZE, 0.65, 2, 2
     x, y, z = b.size
     b.add(box(x, y, 0.35 * z), materials.plain("cardboard", "cardboard"))
     red = materials.plain(b.pick(("red", "blue", "green")), "metal", 0.6)
@@ -191,7 +191,7 @@ def can(
 
 CATEGORIES = [
     Entry("pop", can, (0.066, 0.066, 0.122), 0.37, 4, rest="standing"),
-    Entry("pop_case", case_of_cans, (0.200, 0.268, 0.125), 4.5, SIX_PACK, extra=1, vary=0.03, rest="standing"),
+    Entry("pop_case", case_of_cans, (0.200, 0.268, 0.125), 4.5, FOUR_PACK, extra=1, vary=0.03, rest="standing"),
     Entry("jar", jar, (0.095, 0.095, 0.150), 0.42, 6, rest="upright"),
     Entry("jam", filled_jar, (0.072, 0.072, 0.092), 0.45, 3, rest="standing",
           options={"fills": ("dark_red", "orange", "purple")}),

@@ -13,7 +13,7 @@ import dataclasses
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -176,6 +176,7 @@ class _Task:
     rejected: Rejections
     before: Snapshot
     others: Bystanders
+    pushable: Collection[int]
     at_once: Iterator[int] = dataclasses.field(default_factory=lambda: itertools.count(1))
 
 
@@ -197,6 +198,7 @@ class Placer:
         rejected: Rejections,
         along: int = -1,
         flat: bool = False,
+        pushable: Collection[int] = (),
     ) -> bool:
         """Puts an object into an area so that `truth` holds afterwards; leaves the world as it was where it cannot.
 
@@ -205,9 +207,10 @@ class Placer:
           along: an object with whose sides every second orientation is aligned, so that a pillow finds its place in a
             cabinet that it all but fills; -1: all are turned by any angle.
           flat: of its stable orientations, the object takes one in which it is lowest, so that it can bear something.
+          pushable: objects that may be moved, so long as `truth` holds.
         """
         before = self.query.save()
-        task = _Task(object_index, truth, rng, budget, rejected, before, Bystanders(self.query, before))
+        task = _Task(object_index, truth, rng, budget, rejected, before, Bystanders(self.query, before), pushable)
         container = False
         for draw in range(DRAWS):
             if budget.spent():
@@ -329,7 +332,7 @@ class Placer:
         """Puts the object there and lets physics settle; the reason why that is no good, or ''."""
         query, placed = self.query, task.object_index
         exempt = task.others.touching[placed].copy()  # what lies on it may fall when it is taken away
-        exempt[placed] = True
+        exempt[[placed, *task.pushable]] = True
         query.place(placed, pos, quat)
         if area.push_towards >= 0:
             pos = self._pushed(placed, pos, quat, area.push_towards)

@@ -99,8 +99,8 @@ class RowSampler:
 
         Args:
           conditions: of objects' names (see `conditions.bind`). rejected: counts of reasons are added to it.
-          keep: leave objects as they are of which everything holds already, and place larger objects first; else every
-            object is placed again. again: objects that are placed again nevertheless, on their flattest side.
+          keep: leave objects as they are of which everything holds already, place larger objects first, and let objects
+            that have been placed be pushed so long as their conditions hold; else every object is placed again. again: objects that are placed again nevertheless, on their flattest side.
 
         Raises:
           StateError, AbilityError, UnknownNameError: a condition that can never be made true.
@@ -158,6 +158,7 @@ class RowSampler:
             if budget.spent():
                 return False
             name, wanted = placements[k]
+            self._placed = placements[:k] if self._keep else ()
             before.append(self.query.save())
             part = budget if len(placements) == 1 else budget.part(SHARE)
             left = part.work
@@ -197,8 +198,20 @@ class RowSampler:
         along = -1
         if rule.value and rule.predicate != "on_floor":
             along = object_index(self.model, rule.other_than(name))
-        flat = name in self._again
-        if not self._placer.place(index, areas, lambda: self._holds(wanted), rng, budget, rejected, along, flat):
+        earlier = tuple(c for _, placed in self._placed for c in placed)
+        pushable = {object_index(self.model, n) for n, _ in self._placed if n not in self._fixed}
+        done = self._placer.place(
+            index,
+            areas,
+            lambda: self._holds(wanted) and (not earlier or self._holds(earlier)),
+            rng,
+            budget,
+            rejected,
+            along,
+            flat=name in self._again,
+            pushable=pushable,
+        )
+        if not done:
             return False
         opened = [c for c in self._joints if c.arguments[0] == name]
         if all(self._open(c, rng, rejected) for c in opened) and (not opened or self._holds(wanted)):
