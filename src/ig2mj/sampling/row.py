@@ -100,7 +100,8 @@ class RowSampler:
         Args:
           conditions: of objects' names (see `conditions.bind`). rejected: counts of reasons are added to it.
           keep: leave objects as they are of which everything holds already, place larger objects first, and let objects
-            that have been placed be pushed so long as their conditions hold; else every object is placed again. again: objects that are placed again nevertheless, on their flattest side.
+            that have been placed be pushed so long as their conditions hold; else every object is placed again.
+          again: objects that are placed again nevertheless, on their flattest side.
 
         Raises:
           StateError, AbilityError, UnknownNameError: a condition that can never be made true.

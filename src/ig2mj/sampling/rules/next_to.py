@@ -94,7 +94,7 @@ class _Cells:
         import scipy.ndimage
 
         away = np.asarray(scipy.ndimage.distance_transform_edt(~self._occupied)) * CELL
-        found = self._meets(away <= self.near + CELL)
+        found = self._meets(away <= self.near + CELL / 2)
         return self._lookup(found if facing is None else found & facing)
 
     def apart(self, facing: Bool[np.ndarray, "R C"] | None = None) -> Allowed:

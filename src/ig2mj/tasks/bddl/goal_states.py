@@ -10,6 +10,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import functools
+import itertools
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -22,7 +23,6 @@ from ig2mj.cluster.job_runner import Where
 from ig2mj.cluster.jobs import Job, JobSet, WholeRunError
 from ig2mj.cluster.journal import Journal
 from ig2mj.errors import EngineError, StateError
-from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.readings import Literals, fewest_changes, readings
 from ig2mj.process import entry_point
@@ -48,6 +48,9 @@ ATTEMPT_BUDGET = 400
 
 STREAM = 1
 """Of random numbers, next to that of starts."""
+
+LOOKED_AT = 20_000
+"""Literals that are looked at for a reading in which each object is in one place."""
 
 ELSEWHERE = ("inside", "on_top", "on_floor")
 """Predicates of which an object fulfils one at a time, and of one second argument."""
@@ -213,7 +216,7 @@ class GoalSampler:
         Args:
           truth: of the goal's atoms in the start. cheapest: alternatives that change least come first.
         """
-        return choose_reading(self._goal, truth, rng, cheapest, self._fixed)
+        return choose_reading(self._goal.ground, truth, rng, cheapest, self._fixed)
 
     def _with_help(self, reading: tuple[Condition, ...]) -> tuple[tuple[Condition, ...], tuple[str, ...]]:
         """A reading with what makes it easier: containers stand open, and loose supports are put down flat.
@@ -221,6 +224,7 @@ class GoalSampler:
         Returns:
           Conditions, and objects that must be placed again.
         """
+        self.sampler.query.load(self.sampler.start[0])
         tables = self.model.tables
         openable = {tables.object_names[o] for o in tables.openable_object}
         said = {c.arguments[0] for c in reading if c.predicate == "open"}
@@ -262,13 +266,13 @@ class GoalSampler:
 
 
 def choose_reading(
-    goal: CompiledExpression,
+    goal: Expression,
     truth: Mapping[Atom, bool],
     rng: np.random.Generator,
     cheapest: bool,
     fixed: frozenset[str] = frozenset(),
 ) -> Literals | None:
-    """See `GoalSampler.reading`. `fixed`: objects that cannot be moved."""
+    """See `GoalSampler.reading`. `goal`: ground. `fixed`: objects that cannot be moved."""
 
     def rank(options: Sequence[Expression], value: bool) -> list[Expression]:
         shuffled = [options[n] for n in rng.permutation(len(options))]
@@ -282,8 +286,10 @@ def choose_reading(
         first, second = atom.arguments
         return first != second and (first not in fixed or (atom.predicate in MUTUAL and second not in fixed))
 
+    looked_at = itertools.count()
+
     def in_one_place(chosen: Mapping[Atom, bool], atom: Atom, value: bool) -> bool:
-        if not possible(chosen, atom, value):
+        if next(looked_at) > LOOKED_AT or not possible(chosen, atom, value):
             return False
         if not value or atom.predicate not in ELSEWHERE:
             return True
@@ -296,7 +302,7 @@ def choose_reading(
         )
 
     for accepts in (in_one_place, possible):
-        found = next(readings(goal.ground, accepts, rank), None)
+        found = next(readings(goal, accepts, rank), None)
         if found is not None:
             return found
     return None
