@@ -23,7 +23,7 @@ def borne_by(areas: Areas, query: SceneQuery, support: int, loose: bool) -> Area
 
             def allowed(row: np.ndarray, col: np.ndarray, area: PlacementArea = area) -> np.ndarray:
                 place = (np.stack([col, row], -1) + 0.5) * CELL
-                here = ((place >= low[:2]) & (place <= high[:2])).all(-1)
+                here = np.asarray(((place >= low[:2]) & (place <= high[:2])).all(-1))
                 return here if area.allowed is None else here & area.allowed(row, col)
 
             yield dataclasses.replace(area, supports=(support,), allowed=allowed, loose=loose)

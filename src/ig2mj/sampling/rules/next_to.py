@@ -110,9 +110,9 @@ class _Cells:
         if not looks:
             com = np.asarray(self._query.view.object_com[0, self._neighbour, :2])
             cell = np.floor(com / CELL).astype(int)
-            star = np.zeros(self._occupied.shape, bool)
+            star = np.zeros_like(self._occupied)
             col, row = (cell + offsets - [self._window.col, self._window.row]).T
-            inside = (row >= 0) & (row < star.shape[0]) & (col >= 0) & (col < star.shape[1])
+            inside = (row >= 0) & (row < self._window.rows) & (col >= 0) & (col < self._window.cols)
             star[row[inside], col[inside]] = True
             return self._meets(star)
         centre = np.rint(self._shape.centre / CELL).astype(int)
