@@ -182,7 +182,7 @@ def _take_soup(meshes: list[Mesh], label: str, options: HullOptions, out: ShapeP
         return
     volume = enclosed_volume(solid, whole)
     out.enclose(volume)
-    if options.whole_meshes:
+    if options.whole_meshes or options.max_hulls == 1:  # pieces would be merged into it
         out.items.append(Convex(whole, "hull"))
         return
     ratio, depth = options.hull_ratio, options.hull_depth

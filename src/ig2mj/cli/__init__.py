@@ -58,7 +58,7 @@ from ig2mj.process.variables import error_of_variable
 #: hyphen in it an underscore.
 COMMANDS: dict[str, str] = {
     "demo": "convert a small home, simulate it, cook a fish in it; let a robot cook",
-    "convert": "convert iGibson scenes and URDF objects and robots to MJCF",
+    "convert": "convert iGibson scenes, URDF objects, and robots of URDF or MJCF",
     "view": "open a scene in MuJoCo's viewer, or write an image of it",
     "web": "show a scene, an environment or a recording in the browser",
     "inspect": "list a scene's objects, joints, abilities and rooms",
@@ -82,6 +82,7 @@ COMMANDS: dict[str, str] = {
     "objects": "list and show the objects that can be added to a home, add libraries of your own",
     "homes": "make a home of your own; list, build, convert and render those that come with ig2mj",
     "plugins": "list the states, commands and the like that installed packages and files of your own add",
+    "robots": "show which parts of a robot of your own do what; try it in a home",
     "doctor": "show what this machine can run, and how to fix what it cannot",
 }
 

@@ -117,30 +117,55 @@ def convert_object(
 
 
 def convert_robot(
-    urdf: pathlib.Path,
     out: pathlib.Path,
+    urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    mjcf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     name: str | None = None,
+    layout: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     mesh_root: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None,
     package_path: Annotated[tuple[pathlib.Path, ...], tyro.conf.arg(metavar="DIR")] = (),
     common: Annotated[Common, tyro.conf.OmitArgPrefixes] = DEFAULTS,
 ) -> int:
-    """Convert a robot's URDF: OUT/object.xml, robot.json, meshes/; for `UrdfRobot.load(OUT)` in Python.
+    """Convert a robot's URDF or MJCF: OUT/object.xml, robot.json, layout.toml, robot.png, meshes/.
 
-    `ig2mj rollout` and `ig2mj view` take the URDF itself (`--robot-urdf`). Exit status: 0 converted; 2 bad input.
+    Prints which joints and links were taken for base, wheels, arms, grippers, hands, camera and laser. Edit
+    OUT/layout.toml to change that. `--robot OUT` of other commands, and `ig2mj.make(..., robot="OUT")`, take the
+    folder. Exit status: 0 converted; 2 bad input, a robot with legs among it.
 
     Args:
+      out: output folder; an earlier result there is replaced once the conversion succeeds, except its layout.toml.
       urdf: the robot's URDF.
-      out: output folder; an earlier result there is replaced once the conversion succeeds.
-      name: name of the robot; default: the one in the URDF.
+      mjcf: the robot's MJCF, e.g. of MuJoCo Menagerie, or a scene that includes it.
+      name: name of the robot; default: the one in the file.
+      layout: TOML or JSON file that corrects the assignment (docs/guide/robots.md).
       mesh_root: additional folder from which meshes may be read (URDFs that use ../ or absolute paths).
       package_path: folders that hold the packages of `package://` names.
     """
     from ig2mj_converters.convert_robot import convert_robot as convert
 
+    from ig2mj.agents.urdf.robot import own_layout
+    from ig2mj.cli.common.robot_report import tell_robot, write_layout
+    from ig2mj.errors import Ig2mjError, InputError
+
+    if (urdf is None) == (mjcf is None):
+        raise Ig2mjError("name the robot's file: --urdf FILE or --mjcf FILE")
+    file = urdf if urdf is not None else mjcf
+    assert file is not None
+    if (file.suffix.lower() in (".xml", ".mjcf")) != (mjcf is not None) and file.is_file():
+        option, other = ("--urdf", "--mjcf") if mjcf is None else ("--mjcf", "--urdf")
+        raise InputError(file, f"is not what {option} takes", fix=f"{other} FILE")
+    if layout is not None and not layout.is_file():
+        raise InputError(layout, "is not a file", element="--layout", fix="name a TOML or JSON file")
+    kept = own_layout(out)
+    former = None if kept is None or layout is not None else (kept.name, kept.read_bytes())
     options = options_of(common, default_jobs=os.cpu_count() or 1, mesh_root=mesh_root, package_path=package_path)
-    with _progress(f"converting {urdf.name}") as options_with:
-        outcome = convert(urdf, out, name=name, options=options_with(options))
-    return _tell(outcome, out, "object.xml", common.json)
+    with _progress(f"converting {file.name}") as options_with:
+        outcome = convert(file, out, name=name, options=options_with(options))
+    said = write_layout(out, layout, former)
+    status = _tell(outcome, out, "object.xml", common.json)
+    if not common.json:
+        tell_robot(out, said)
+    return status
 
 
 SUBCOMMANDS = {"scene": convert_scene, "object": convert_object, "robot": convert_robot, "dataset": convert_dataset}

@@ -38,7 +38,7 @@ GRIPS = ("finger", "gripper", "jaw", "thumb", "knuckle", "claw", "pincer", "driv
 PASSIVE = ("caster", "castor", "swivel")
 OMNI = ("mecanum", "omni", "swedish", "holonomic")
 SUCTION = ("suction", "vacuum")
-CAMERAS = ("camera", "eyes", "cam_", "head_tilt", "head")
+CAMERAS = ("camera", "realsense", "kinect", "xtion", "eyes", "cam_", "_cam", "head_tilt", "head")
 LASERS = ("laser", "scan", "lidar")
 
 LEGS = frozenset(("hip", "thigh", "calf", "knee", "ankle", "shank", "foot", "leg", "haa", "hfe", "kfe"))
@@ -108,7 +108,7 @@ def find_layout(
         closed=given.get("closed", "" if gripper and not several else "lower"),
         hand=hand,
         camera=_link(given, "camera", _first(robot, CAMERAS)),
-        laser=_link(given, "laser", _first(robot, LASERS)),
+        laser=_link(given, "laser", _first(robot, LASERS, on_base=True)),
         start={joint: float(at) for joint, at in given.get("start", _start(robot, body)).items()},
         several=several,
         suction=suction,
@@ -246,6 +246,9 @@ def _gripping(robot: Description, free: Sequence[RobotJoint]) -> list[RobotJoint
         if chain & hands or any(hand in {j.child for b in moving for j in inside(b)} for hand in hands):
             continue
         found += [j for branch in moving for j in inside(branch) if j in free and j not in found]
+    for link in hands:  # other fingers of a hand, whatever they are called
+        fingers = [j for j in below.get(link, []) if j.type != "continuous" and longest(j) <= SHORT_BRANCH]
+        found += [j for finger in fingers for j in inside(finger) if j in free and j not in found]
     return [joint for joint in free if joint in found]
 
 
@@ -253,7 +256,8 @@ def _gripper(robot: Description, free: Sequence[RobotJoint], given: Mapping[str,
     """Joints of the only gripper."""
     taken = set(given.get("arm", ()))
     named = [joint.name for joint in free if _grips(robot, joint)]
-    return named or [joint.name for joint in _gripping(robot, free) if joint.name not in taken]
+    found = [joint.name for joint in _gripping(robot, free) if joint.name not in taken]
+    return found if set(named) <= set(found) else named
 
 
 def _several(
@@ -311,12 +315,14 @@ def _hand(robot: Description, arm: Sequence[str], gripper: Sequence[str], suctio
     return next(link for link in reversed(ends) if before(link) == most)
 
 
-def _first(robot: Description, names: Sequence[str]) -> str | None:
-    """The first link of the likeliest name; an optical frame only where there is no other."""
+def _first(robot: Description, names: Sequence[str], on_base: bool = False) -> str | None:
+    """The first link of the likeliest name; an optical frame only where there is no other. on_base: those that are
+    fixed to the base come first."""
     for part in names:
         found = [link for link in robot.frames if part in link.lower()]
         if found:
-            return min(found, key=lambda link: "optical" in link.lower())
+            away = {link: on_base and robot.frames[link].on != robot.base for link in found}
+            return min(found, key=lambda link: (away[link], "optical" in link.lower()))
     return None
 
 

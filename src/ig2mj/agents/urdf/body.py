@@ -13,7 +13,7 @@ import numpy as np
 
 from ig2mj.agents.kinematics import Chain
 from ig2mj.agents.parts import Vector, multiply, rotate
-from ig2mj.agents.urdf.description import Description
+from ig2mj.agents.urdf.description import Description, RobotJoint
 from ig2mj.agents.urdf.layout import Gripper, Layout
 from ig2mj.agents.urdf.references import (
     BASE,
@@ -249,9 +249,17 @@ class RobotBody:
         return np.array([1.0 if self._data.joint(n).xaxis @ left >= 0 else -1.0 for n in names])
 
     def fingers(self, gripper: Gripper) -> list[str]:
-        """Links that a gripper's joints move, and those of joints that follow them; in the order of the file's."""
-        robot = self._description
-        return [j.child for j in robot.joints if robot.leader(j.name) in gripper.joints]
+        """Links that a gripper's joints move, those of joints that follow them, and passive ones of a linkage on the
+        same hand; in the order of the file's."""
+        robot, hand = self._description, self.frame(gripper.hand)[0]
+        above = {joint.child: joint for joint in robot.joints}
+
+        def belongs(joint: RobotJoint) -> bool:
+            if not joint.passive:
+                return robot.leader(joint.name) in gripper.joints
+            return joint.parent == hand or (joint.parent in above and belongs(above[joint.parent]))
+
+        return [joint.child for joint in robot.joints if belongs(joint)]
 
     def branch(self, link: str, gripper: Gripper) -> str:
         """The first link of the finger that a finger's link belongs to."""

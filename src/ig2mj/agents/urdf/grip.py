@@ -29,6 +29,9 @@ NEARER = 1e-3
 OPPOSITE = 2
 """Most fingers that another one closes against."""
 
+FAR = 0.9
+"""Share of the farthest finger's distance from the hand up to which a part of it is a finger."""
+
 CUP, SUCTION_REACH = 0.006, 0.03
 """m: half the distance between the rays of a suction cup, and how far they lead out of it."""
 
@@ -194,7 +197,7 @@ def finger_tips(body: RobotBody, gripper: Gripper) -> list[str]:
     """The last link with a shape of each finger, in the order of the file's.
 
     Where branches of a hand have different numbers of links, fingers are those with the most: the others guide them, as
-    the inner knuckles of a four-bar linkage do.
+    the inner knuckles of a four-bar linkage do. Of more than two, those are no fingers that end nearer to the hand.
     """
     tips: dict[str, str] = {}
     links: dict[str, int] = {}
@@ -206,7 +209,15 @@ def finger_tips(body: RobotBody, gripper: Gripper) -> list[str]:
     if len(tips) > 2:
         most = sorted((links[branch] for branch in tips), reverse=True)[1]
         tips = {branch: link for branch, link in tips.items() if links[branch] >= most}
-    return list(tips.values())
+    found = list(tips.values())
+    if len(found) > 2:
+        data, hand = body.posed(_half_way(body, gripper)), body.frame(gripper.hand)[0]
+        origin = body.pose(hand, data)[0]
+        ends = {tip: _to_base(body, tip, body.points(tip), data) - origin for tip in found}
+        reach = {tip: float(np.linalg.norm(points, axis=1).max()) for tip, points in ends.items()}
+        far = [tip for tip in found if reach[tip] >= FAR * max(reach.values())]
+        found = far if len(far) >= 2 else found
+    return found
 
 
 def _named(name: str, body: RobotBody, link: str) -> str:

@@ -171,7 +171,7 @@ class UrdfRobot(TaskRobot):
         pos[2] += standing + mount
         quat, layout = normalized(self.quat if quat is None else quat), self.layout
         bodies = self.body.add_to(spec, self.name, pos, quat, fixed=not self.drives, layout=layout)
-        fingers = self._fingers
+        fingers = self.finger_links
         for link, body in bodies.items():
             body.gravcomp = 0.0 if link == self.description.base or link in self._rolling else 1.0
             if link in self._rolling or link in fingers:
@@ -213,15 +213,16 @@ class UrdfRobot(TaskRobot):
     def holding(self) -> tuple[str, ...]:
         """Links that hold something, as the scene numbers them: those with rays, else all hands."""
         frames, palms = self.description.frames, {hand.palm for hand in self.hand_rays()}
-        named = [(frames[link].on, self._body_name(frames[link].on)) for link in self.layout.hands]
+        named = [(frames[link].on, self.body_name(frames[link].on)) for link in self.layout.hands]
         holding = [link for link, body in named if body in palms]
         return tuple(dict.fromkeys(holding or [link for link, _ in named]))
 
-    def _body_name(self, link: str) -> str:
+    def body_name(self, link: str) -> str:
+        """Of a link that moves, or the base, in a scene."""
         return self.name if link == self.description.base else f"{self.name}_{link}"
 
     @property
-    def _fingers(self) -> list[str]:
+    def finger_links(self) -> list[str]:
         """Links that press on what a hand holds: fingers, the fixed jaw of a gripper with one, palms of suction."""
         body, found = self.body, []
         for gripper in self.layout.grippers:
@@ -269,7 +270,7 @@ class UrdfRobot(TaskRobot):
         for link in layout.suction:
             added = spec.add_actuator(
                 name=f"{self.name}_{link}_suction",
-                target=self._body_name(self.body.frame(link)[0]),
+                target=self.body_name(self.body.frame(link)[0]),
                 trntype=mujoco.mjtTrn.mjTRN_BODY,
                 gaintype=mujoco.mjtGain.mjGAIN_FIXED,
                 ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
