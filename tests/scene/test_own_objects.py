@@ -60,6 +60,13 @@ def test_an_object_of_ones_own_starts_at_its_place_and_can_move(tiny_home_folder
     assert again.additions == scene.additions
 
 
+def test_an_object_may_not_start_inside_of_another(tiny_home_folder, cup):
+    first = f"{cup}@0.5,0.25,1,0"
+    with pytest.raises(Ig2mjError, match=r"starts \d+\.\d cm inside of cup_\d: .*@on_top:OBJECT"):
+        ig2mj.load_scene(tiny_home_folder, objects=[first, f"{cup}@0.51,0.25,1,0"])
+    assert ig2mj.load_scene(tiny_home_folder, objects=[first, f"{cup}@0.58,0.25,1,0"]).additions
+
+
 @pytest.mark.slow
 def test_a_predicate_says_where_an_object_starts_in_the_same_place_every_time(tiny_home_folder, cup):
     wanted = [f"{cup}@on_top:box", f"{cup}@on_top:box"]

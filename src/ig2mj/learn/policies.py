@@ -80,7 +80,7 @@ def objects_of(policy: Policy, file: object) -> tuple[str, ...]:
       InputError: it is missing; names `file`.
     """
     wanted = policy.card.get("objects", [])
-    return requests_again(wanted, policy.card["objects_found_by"], str(file)) if wanted else ()
+    return requests_again(wanted, policy.card.get("objects_found_by", []), str(file)) if wanted else ()
 
 
 def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, Any]:

@@ -65,7 +65,8 @@ def requests_again(
       InputError: a model is missing, or the entries do not belong to the texts.
     """
     try:
-        known = [entry.addition() for entry in msgspec.convert(list(entries), list[AdditionEntry])]
+        known = [entry.addition() for entry in msgspec.convert(entries, list[AdditionEntry])]
+        wanted = msgspec.convert(wanted, tuple[str, ...])
     except msgspec.ValidationError as e:
         raise InputError(file, str(e), element="objects") from e
     texts = added(wanted)

@@ -33,6 +33,7 @@ from ig2mj.scene.object_requests import ObjectRequest, Pose, read_request
 from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
 from ig2mj.scene.physics_digest import physics_digest
 from ig2mj.scene.rooms import Rooms, load_rooms
+from ig2mj.scene.start_overlap import check_start
 from ig2mj.scene.tables import SceneTables
 from ig2mj.scene.walls import deepen_walls
 
@@ -220,7 +221,8 @@ def load_scene(
 
     Raises:
       InputError: a file is missing or is not valid MJCF. UnknownNameError: there is no such folder and the library has
-        no such object, or the home has none of this name. Ig2mjError: a replacement stands in something, or falls.
+        no such object, or the home has none of this name. Ig2mjError: an object starts inside of something, or a
+        replacement stands in something, or falls.
         ManifestError: a manifest is broken, or does not belong to its MJCF. StateError: no place was found at which the
         predicate holds.
     """
@@ -236,7 +238,9 @@ def load_scene(
             dataclasses.replace(r, place=poses[n], kind="loose", predicate=None) if r.predicate else r
             for n, r in zip(names, requests, strict=True)
         ]
-    return _load(file, home, agents, requests, changes)
+    scene = _load(file, home, agents, requests, changes)
+    check_start(scene.model, scene.tables, list(scene.additions))
+    return scene
 
 
 def scene_with(scene: Scene | str | os.PathLike, objects: Objects = ()) -> Scene:
