@@ -17,29 +17,16 @@ HALF = 0.04
 
 def write_cup(folder: pathlib.Path, name: str = "cup", **options) -> pathlib.Path:
     """The folder `name` that `ig2mj convert object` writes for it; options of `convert_object`."""
+    return write_object(folder, name, CUP, **options)
+
+
+def write_object(folder: pathlib.Path, name: str, text: str, **options) -> pathlib.Path:
+    """The same for the text of a URDF."""
     from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.conversion import convert_object
 
     urdf = folder / f"{name}.urdf"
-    urdf.write_text(CUP)
+    urdf.write_text(text)
     given = {"category": "mug", **options}
     convert_object(urdf, given.pop("category"), folder / name, options=ConvertOptions(report=False), **given)
-    return folder / name
-
-
-TABLE = """<robot name="side_table"><link name="base_link">
-<visual><origin xyz="0 0 0.25"/><geometry><box size="0.4 0.6 0.5"/></geometry>
-<material name="clay"><color rgba="0.3 0.45 0.6 1"/></material></visual>
-<collision><origin xyz="0 0 0.25"/><geometry><box size="0.4 0.6 0.5"/></geometry></collision>
-</link></robot>"""
-
-
-def write_table(folder: pathlib.Path, name: str = "side_table") -> pathlib.Path:
-    """The folder `name` of a fixed table, 0.5 m high, whose front looks along x."""
-    from ig2mj_converters.base.options import ConvertOptions
-    from ig2mj_converters.conversion import convert_object
-
-    urdf = folder / f"{name}.urdf"
-    urdf.write_text(TABLE)
-    convert_object(urdf, "coffee_table", folder / name, fixed=True, options=ConvertOptions(report=False))
     return folder / name

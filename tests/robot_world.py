@@ -57,19 +57,22 @@ class RobotWorld:
 
 
 class GraspingWorld(RobotWorld):
-    """A robot whose grasps are assisted, in a `Simulation`, on any engine; an action is 1/10 s."""
+    """A robot whose grasps are assisted, in a `Simulation`, on any engine; an action is 1/10 s.
+
+    `home`: a scene that is loaded has its robots already.
+    """
 
     def __init__(
         self,
-        home: str | os.PathLike,
-        robot: Robot,
+        home: str | os.PathLike | ig2mj.Scene,
+        robot: Robot | None = None,
         mode: str = "assisted",
         targets=(),
         others: tuple[Robot, ...] = (),
         engine: str = "native",
         **options,
     ):
-        self.scene = ig2mj.load_scene(home, agents=[robot, *others])
+        self.scene = home if isinstance(home, ig2mj.Scene) else ig2mj.load_scene(home, agents=[robot, *others])
         self.grasping = Grasping(self.scene, mode, targets)
         self.simulation = ig2mj.Simulation(self.scene, engine, grasping=self.grasping, **options)
         self.controller = self.simulation.core.controllers[0]

@@ -153,6 +153,29 @@ def _difference(name: str, recorded: Mapping[str, Any], here: Mapping[str, Any])
     return f"{name} was {recorded.get(name)!s}, and is {here.get(name)!s} here"
 
 
+def missing_objects(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+    """Objects that were added to the recorded home and are not in this one, as text; others that are, too."""
+    known = [_entries(header) for header in (recorded, here)]
+    if known[0] is None or known[1] is None:
+        return []
+    lacking = [e for e in known[0] if e not in known[1]]
+    extra = [e for e in known[1] if e not in known[0]]
+    found = [f"it needs '{name}' ({model}, hash {sha[:12]}, from {folder})" for name, model, sha, folder in lacking]
+    return [*found, *(f"'{name}' ({model}, hash {sha[:12]}) was not there" for name, model, sha, _ in extra)]
+
+
+def _entries(header: Mapping[str, Any]) -> list[tuple[str, str, str, str]] | None:
+    """Name, model, hash and folder of added objects; None: the file does not say."""
+    try:
+        entries = json.loads(str(header["additions_found_by"]))
+        return [
+            (str(e["name"]), f"{e['category']}/{e['model']}", str(e["sha256"]), str(e["folder"] or "the library"))
+            for e in entries
+        ]
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
 def is_plain(value: object) -> bool:
     """Whether JSON can represent the value."""
     return isinstance(value, str | int | float | bool | None) or (

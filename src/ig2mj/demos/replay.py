@@ -32,7 +32,7 @@ from ig2mj.demos.frames import (
     resumed,
     stacked,
 )
-from ig2mj.demos.origin import BINDING, LOOSE, WHOLE_HASHES, differences, origin_of
+from ig2mj.demos.origin import BINDING, LOOSE, WHOLE_HASHES, differences, missing_objects, origin_of
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.shipped import find_recording
 from ig2mj.demos.writer import FLUSH
@@ -126,7 +126,7 @@ class Replayer:
         if bound and by == "action":
             raise InputError(
                 recording.file,
-                f"cannot be replayed by action: {'; '.join(bound)}",
+                f"cannot be replayed by action: {'; '.join(missing_objects(recording.header, here) + bound)}",
                 fix="replay it by state (--by state)",
             )
         self.warnings, self.here = bound + differences(recording.header, here, loose), here

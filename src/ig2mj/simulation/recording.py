@@ -18,7 +18,7 @@ import jax
 import numpy as np
 
 from ig2mj.demos.frames import Labels, first_difference, names_of, plugin_columns
-from ig2mj.demos.origin import LOOSE, differences, origin_of_machine, origin_of_scene, origin_of_states
+from ig2mj.demos.origin import LOOSE, differences, missing_objects, origin_of_machine, origin_of_scene, origin_of_states
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayed
 from ig2mj.demos.writer import FLUSH, FORMAT_VERSION, RunWriter
@@ -163,7 +163,10 @@ def _replayed(simulation: Simulation, recording: Recording) -> Replayed:
         raise InputError(recording.file, "is a recording of an environment, not of a simulation", fix=fix)
     if bound := differences(recording.header, here, BINDING) + recording.missing_states(here):
         fix = "replay it in the simulation that it was recorded in"
-        raise InputError(recording.file, f"cannot be replayed: {'; '.join(bound)}", fix=fix)
+        objects = missing_objects(recording.header, here)
+        if objects:
+            fix = "load the home with the same objects: load_scene(..., objects=[...])"
+        raise InputError(recording.file, f"cannot be replayed: {'; '.join(objects or bound)}", fix=fix)
     names, like, labels = _names(simulation), _leaves(simulation), Labels(simulation.scene)
     tree = jax.tree.structure(_world(simulation))
     found, frames, runs = [], 0, [run for run in recording.runs if run.frames]
