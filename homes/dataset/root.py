@@ -81,10 +81,10 @@ def write_models(out: pathlib.Path, wanted: Mapping[str, Collection[int]], seed:
     entries = _chosen(wanted)
     sizes: dict[str, list[list[float]]] = {}
     for entry in entries:
-        models = [build_model(entry, index, seed) for index in range(entry.count)]
-        sizes[entry.category] = [[float(v) for v in high - low] for low, high in (model.bounds() for model in models)]
+        bounds = [build_model(entry, index, seed).bounds() for index in range(entry.count)]
+        sizes[entry.category] = [[float(v) for v in high - low] for low, high in bounds]
         for index in sorted(set(wanted[entry.category])):
-            write_model(models[index], out / "objects")
+            write_model(build_model(entry, index, seed), out / "objects")
     write_metadata(out, entries, sizes)
 
 

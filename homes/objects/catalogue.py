@@ -44,6 +44,14 @@ def find(category: str) -> Entry:
     return entries[category]
 
 
+def model_number(entry: Entry, model: str, seed: int = 0) -> int:
+    """The number of a category's model by its name, such as "sofa_02". Raises UnknownNameError."""
+    names = [build_model(entry, index, seed).model for index in range(entry.count + entry.extra)]
+    if model not in names:
+        raise UnknownNameError(f"model of {entry.category}", model, names)
+    return names.index(model)
+
+
 def build_model(entry: Entry, index: int, seed: int = 0) -> HouseholdObject:
     """The category's model number `index`, with its halves where it is sliceable. Same arguments, same model."""
     if is_folder(entry.category):

@@ -7,6 +7,8 @@ import pathlib
 import random
 import re
 
+from ig2mj.errors import UnknownNameError
+
 from ..furnish.arrangement import FLAT
 from ..furnish.clearances import blocked
 from ..furnish.kit import DEGREES, RoomKit
@@ -14,7 +16,7 @@ from ..furnish.kitchen import in_the_middle
 from ..furnish.placed import Placed
 from ..furnish.room import HomeInProgress
 from ..furnish.start import NoRoomToOpen, lay_doormat, start_home
-from ..objects.catalogue import IN_WALLS, build_model, catalogue, find
+from ..objects.catalogue import IN_WALLS, catalogue, find, model_number
 from ..objects.folder_model import is_folder
 from ..plans.plan import Plan
 from .description import HomeDescription, PieceSpec, category_of, near
@@ -87,10 +89,10 @@ def resolve(home: HomeDescription, model: str, element: str) -> tuple[str, int |
         raise home.error(element, problem, "`ig2mj homes list --objects` lists categories")
     if not mark:
         return category, None
-    names = {build_model(known[category], k, home.seed).model: k for k in range(known[category].count)}
-    if number not in names:
-        raise home.unknown(element, f"model of {category}", number, names)
-    return category, names[number]
+    try:
+        return category, model_number(known[category], number, home.seed)
+    except UnknownNameError as e:
+        raise home.error(element, str(e)) from e
 
 
 def is_own(thing: Placed) -> bool:

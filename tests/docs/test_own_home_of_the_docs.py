@@ -48,6 +48,7 @@ def test_the_home_passes_all_checks_and_has_what_the_file_says(folder):
     assert {c["name"] for c in checks} >= {"settle", "penetration", "joint_clearance", "opens", "reachable"}
     assert {"fridge", "table", "side_table", "cup", "plate_0", "plate_1", "book"} <= set(scene.object_names)
     assert scene.object("side_table").fixed and scene.object("side_table").rooms == ["living_room_0"]
+    assert scene.object("apple").rooms == ["kitchen_0"] and scene.object("book").rooms == ["living_room_0"]
     assert scene.rooms is not None and set(scene.rooms.names) == {"kitchen_0", "living_room_0", "bathroom_0"}
 
 

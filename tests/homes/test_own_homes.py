@@ -7,10 +7,13 @@ import textwrap
 
 import numpy as np
 import pytest
+from ig2mj_homes.objects.catalogue import build_model, find
+from ig2mj_homes.objects.folder_model import folder_model
 from ig2mj_homes.own.description import HomeDescription, copies, read_home
 from ig2mj_homes.own.own_furniture import furnish_own
 from ig2mj_homes.own.own_plan import make_own_plan
 
+from ig2mj import cli
 from ig2mj.errors import InputError
 
 ROOMS = """
@@ -131,3 +134,14 @@ def test_an_error_names_a_place_where_the_piece_fits(tmp_path: pathlib.Path):
 def test_copies_of_an_object_are_numbered(tmp_path: pathlib.Path):
     home = described(tmp_path, "[objects]\nplate = { where = '(on_top plate table)', count = 2 }")
     assert copies("plate", home.objects["plate"]) == ["plate_0", "plate_1"]
+
+
+def test_furniture_of_the_catalogue_is_written_as_a_folder_with_the_model_asked_for(tmp_path, capsys):
+    assert cli.call(["homes", "model", "console_table/console_table_01", "--out", str(tmp_path / "table")]) == 0
+    found = folder_model(str(tmp_path / "table"))
+    assert (found.entry.category, found.entry.model, found.entry.fixed) == ("console_table", "console_table_01", True)
+    built = build_model(find("console_table"), 1)
+    np.testing.assert_allclose(found.model.bounds(), built.bounds(), atol=2e-3)
+    assert [j.kind for j in found.model.joints] == [j.kind for j in built.joints]
+    assert cli.call(["homes", "model", "console_table/console_table_99", "--out", str(tmp_path / "other")]) == 2
+    assert "near matches: console_table_0" in capsys.readouterr().err

@@ -78,6 +78,43 @@ def make(
     return 1 if made.failed else 0
 
 
+def model(
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="CATEGORY[/MODEL]")],
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")],
+    seed: int = 0,
+) -> None:
+    """Write a model of the catalogue as a folder, as `ig2mj convert object` writes one.
+
+    Furniture for `--replace` and `--object`, which the object library does not have: a sofa, a bed, a cabinet.
+
+    Args:
+      name: its category, for the first model, or one of its models: sofa/sofa_02.
+      out: output folder; an earlier result there is replaced.
+      seed: random seed of all variation; homes that ship have 0.
+    """
+    import tempfile
+
+    from ig2mj_converters.base.options import ConvertOptions
+    from ig2mj_converters.conversion import convert_object
+    from ig2mj_homes.dataset.root import write_models
+    from ig2mj_homes.objects.catalogue import build_model, catalogue, find, model_number
+
+    from ig2mj.errors import UnknownNameError
+
+    category, _, wanted = name.partition("/")
+    if category not in catalogue():
+        raise UnknownNameError("category", category, catalogue())
+    entry = find(category)
+    index = model_number(entry, wanted, seed) if wanted else 0
+    made = build_model(entry, index, seed).model
+    with tempfile.TemporaryDirectory(prefix="ig2mj-model-") as root:
+        write_models(pathlib.Path(root), {category: [index]}, seed)
+        urdf = pathlib.Path(root) / "objects" / category / made / f"{made}.urdf"
+        options = ConvertOptions(cache=False, max_hulls=MAX_HULLS, report=False)
+        convert_object(urdf, category, out, model=made, fixed=entry.fixed, options=options)
+    print(f"{out}: {category}/{made}, {'fixed' if entry.fixed else 'loose'} (look: ig2mj view {out})")
+
+
 def build(
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DATASET")],
     seed: int = 0,
@@ -353,6 +390,7 @@ def _entries(only: tuple[str, ...]) -> list[Entry]:
 
 SUBCOMMANDS: dict[str, Callable[..., int | None]] = {
     "make": make,
+    "model": model,
     "build": build,
     "convert": convert,
     "list": list_,

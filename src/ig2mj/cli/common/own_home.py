@@ -205,6 +205,11 @@ def _sample(home: OwnHome, folder: pathlib.Path) -> None:
     names = [model.body(b).name for b in range(model.nbody)]
     for entry, states in zip(scene.manifest.objects, manifest_states(sampler.model, row.states, names), strict=True):
         entry.state = states
+    lying = {loose.name for loose in home.loose}
+    for entry in scene.manifest.objects:
+        if entry.name in lying and scene.rooms is not None:
+            room = scene.rooms.room_at(data.body(entry.bodies[0]).xpos[:2])
+            entry.rooms = [room] if room is not None else []
     save_manifest(scene.manifest, folder / "manifest.json")
 
 
