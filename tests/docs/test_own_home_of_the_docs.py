@@ -54,11 +54,32 @@ def test_the_home_passes_all_checks_and_has_what_the_file_says(folder):
 
 def test_conditions_hold_at_the_start_and_everything_rests(folder):
     simulation = ig2mj.Simulation(folder / "my_home")
-    for condition in ("(open fridge)", "(inside apple fridge)", "(on_top cup side_table)", "(under book table)"):
+    for condition in (
+        "(open fridge)",
+        "(dusty table)",
+        "(inside apple fridge)",
+        "(on_top cup side_table)",
+        "(under book table)",
+    ):
         assert simulation.holds(condition), condition
     before = simulation.object_pose("cup")[0]
     simulation.step(count=60)
     assert np.linalg.norm(simulation.object_pose("cup")[0] - before) < 1e-3
+
+
+def test_states_of_the_file_are_those_of_the_start(tmp_path):
+    """Each kind of state that a condition can ask for."""
+    conditions = ["(toggled_on stove)", "(dusty stove)", "(stained stove)", "(cooked apple)", "(soaked rag)"]
+    conditions.append("(sliced lemon)")
+    file = tmp_path / "states.toml"
+    file.write_text(
+        f"conditions = {json.dumps(conditions)}\n[rooms]\nkitchen = [0, 0, 4, 3]\n[furniture]\n"
+        'stove = { room = "kitchen" }\ntable = { model = "breakfast_table", room = "kitchen" }\n'
+        '[objects]\napple = "(on_top apple table)"\nrag = "(on_top rag table)"\nlemon = "(on_top lemon table)"\n'
+    )
+    assert cli.call(["homes", "make", str(file), "--out", str(tmp_path / "home")]) == 0
+    simulation = ig2mj.Simulation(tmp_path / "home")
+    assert [condition for condition in conditions if not simulation.holds(condition)] == []
 
 
 def test_it_is_a_home_like_any_other(folder):

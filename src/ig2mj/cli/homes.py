@@ -71,7 +71,8 @@ def make(
         print_json({"folder": str(made.folder), "rooms": made.rooms, "objects": made.objects, "checks": checks})
     else:
         passed = len(made.checks) - len(made.failed)
-        print(f"{made.folder}: {len(made.rooms)} rooms, {len(made.objects)} objects, "
+        rooms = f"{len(made.rooms)} room{'s' * (len(made.rooms) != 1)}"
+        print(f"{made.folder}: {rooms}, {len(made.objects)} objects, "
               f"{passed} of {len(made.checks)} checks passed (look: ig2mj view {made.folder})")  # fmt: skip
         for line in made.failed:
             print(f"  {line}")
