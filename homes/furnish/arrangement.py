@@ -91,7 +91,9 @@ class Arrangement:
                     return "stands in the way through a door or a passage" if owner == WAY else f"stands before {owner}"
         for other in self._solid.near(mine, gap):
             if mine.meets(other, 0.0 if other.low_lying else gap):
-                return f"overlaps {other.name or 'a wall'}" if gap == 0 else f"is too near to {other.name or 'a wall'}"
+                how = "is too near to" if not mine.meets(other) else "overlaps"
+                how = "stands only partly on" if other.thing is not None and other.low_lying else how
+                return f"{how} {other.name or 'a wall'}"
         for other in self._swept.near(mine):
             if other.name not in ignored and mine.meets(other):
                 return f"stands where {other.name} opens"

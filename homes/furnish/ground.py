@@ -26,7 +26,7 @@ class Ground:
         self._half = int(np.ceil((max(-x0, -y0, x1, y1) + 0.5) / CELL))
         self.free = np.zeros((2 * self._half, 2 * self._half), bool)
         self._rooms: dict[str, tuple[slice, slice]] = {}
-        self._gates: list[tuple[int, int]] = []
+        self._gates: dict[tuple[int, int], str] = {}
         self._area: dict[str, float] = {}
         for room in plan.rooms:
             cells = self._inner_cells(plan.inside(room))
@@ -44,7 +44,7 @@ class Ground:
             q = opening.edge.point(opening.high - post, half)
             self.free[self._inner_cells((p[0], p[1], q[0], q[1]))] = True
             x, y = opening.edge.point(opening.centre)
-            self._gates.append((self._cell(y), self._cell(x)))
+            self._gates[self._cell(y), self._cell(x)] = f"the way between {' and '.join(opening.edge.rooms)}"
 
     def allows(self, thing: Placed) -> bool:
         """Whether every room and doorway can still be reached with this object in its place."""
@@ -80,8 +80,9 @@ class Ground:
 
     def _unreachable(self, free: np.ndarray) -> str:
         reach = reachable(free, RADIUS, CELL)
-        if not all(reach[gate] for gate in self._gates):
-            return "a doorway"
+        for gate, name in self._gates.items():
+            if not reach[gate]:
+                return name
         for name, cells in self._rooms.items():
             need = max(LEAST_AREA, min(LEAST_SHARE * self._area[name], 1.2))
             if reach[cells].sum() * CELL**2 < need:

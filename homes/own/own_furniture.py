@@ -7,6 +7,8 @@ import pathlib
 import random
 import re
 
+import msgspec
+
 from ig2mj.errors import UnknownNameError
 
 from ..furnish.arrangement import FLAT
@@ -128,15 +130,27 @@ def _place(home: HomeDescription, made: HomeInProgress, name: str, spec: PieceSp
     kit = RoomKit(made, plan_room(home, made, spec, element, anchor))
     kit.problem = ""
     found = _tried(kit, spec, category, index, anchor)
+    carpets = [t for t in made.things.things.values() if t.category in FLAT and t.rooms == (kit.room.name,)]
+    for carpet in carpets if found is None and (spec.position or spec.in_front_of) else ():
+        found = found or _tried(kit, spec, category, index, anchor, carpet)
     if found is None:
-        if home.windows is None and given and (match := re.search(r"\bwindow_(\d+)", kit.problem)):
-            raise _WindowInTheWay(int(match[1]))
+        if home.windows is None and given:
+            windows = [o for o in made.plan.openings if o.kind == "window"]
+            own = [o for o in kit.openings("window") if kit.side_of(o.edge) == spec.wall]
+            in_wall = [number for number, window in enumerate(windows) if window in own]
+            if match := re.search(r"\bwindow_(\d+)", kit.problem):
+                raise _WindowInTheWay(int(match[1]))
+            if spec.at is None and in_wall:
+                raise _WindowInTheWay(in_wall[0])
         anywhere = not given or (spec.wall is not None and spec.at is None)
         where = f"the {spec.wall} wall of {kit.room.name}" if spec.wall else kit.room.name
         problem = f"{model} does not fit: it {kit.problem or 'finds no place'}"
         if anywhere:
             problem = f"{model} finds no place {'at' if spec.wall else 'in'} {where}"
-        raise home.error(element, problem, _hint(kit, spec, category, index))
+            problem += f": at the first that was tried it {kit.problem}" if kit.problem else ""
+        raise home.error(element, problem, _hint(kit, spec, category, index, anchor))
+    if spec.fixed is not None:
+        found.fixed = spec.fixed
     return found
 
 
@@ -158,25 +172,27 @@ def plan_room(home: HomeDescription, made: HomeInProgress, spec: PieceSpec, elem
     raise home.error(element, "needs a room", 'room = "kitchen", or next to another piece: left_of = "fridge"')
 
 
-def _tried(kit: RoomKit, spec: PieceSpec, category: str, index: int, anchor: Placed | None) -> Placed | None:
+def _tried(
+    kit: RoomKit, spec: PieceSpec, category: str, index: int, anchor: Placed | None, carpet: Placed | None = None
+) -> Placed | None:
+    """The piece in its place, or None. carpet: it stands on this one, wholly."""
     if spec.wall is not None:
         if spec.at is not None and not _on_wall(kit, spec.wall, spec.at, category, index):
             return None
-        return kit.at_wall(
-            category, side=spec.wall, at=spec.at, place="corner", index=index, height=spec.height, fixed=spec.fixed
-        )
+        return kit.at_wall(category, side=spec.wall, at=spec.at, place="corner", index=index, height=spec.height)
     if spec.position is not None:
-        return kit.at(category, spec.position, spec.yaw or 0.0, index=index, gap=0.0, fixed=spec.fixed)
+        return kit.at(category, spec.position, spec.yaw or 0.0, index=index, gap=0.0, carpet=carpet)
     if anchor is None:
         kind = "any" if find(category).fixed or spec.height else "corner"
-        found = kit.at_wall(category, place=kind, index=index, height=spec.height, fixed=spec.fixed)
+        found = kit.at_wall(category, place=kind, index=index, height=spec.height)
         return found or in_the_middle(kit, category)
     if spec.left_of is not None or spec.right_of is not None:  # seen by who looks at its front
         which = -1 if spec.left_of is not None else 1
         return kit.beside(anchor, category, which, index=index, gap=0.012)
     if spec.on is not None:
         return kit.on(anchor, category, index=index, at="middle", degrees=0.0)
-    return kit.before(anchor, category, spec.distance, index=index, along=spec.along, side=SIDES[spec.side])
+    side = SIDES[spec.side]
+    return kit.before(anchor, category, spec.distance, index=index, along=spec.along, side=side, carpet=carpet)
 
 
 def _on_wall(kit: RoomKit, side: str, at: float, category: str, index: int) -> bool:
@@ -190,7 +206,7 @@ def _on_wall(kit: RoomKit, side: str, at: float, category: str, index: int) -> b
     return False
 
 
-def _hint(kit: RoomKit, spec: PieceSpec, category: str, index: int) -> str:
+def _hint(kit: RoomKit, spec: PieceSpec, category: str, index: int, anchor: Placed | None) -> str:
     """Where the piece would fit, near to where it was to stand; ''."""
     start = kit.home.now()
     found: Placed | None = None
@@ -214,4 +230,10 @@ def _hint(kit: RoomKit, spec: PieceSpec, category: str, index: int) -> str:
             if kit.at_wall(category, side=side, place="corner", index=index, height=spec.height) is not None:
                 kit.home.back_to(start)
                 return f'wall = "{side}" has room'
+    elif spec.in_front_of is not None:
+        for more in range(1, 20):
+            distance = round(spec.distance + 0.05 * more, 3)
+            if _tried(kit, msgspec.structs.replace(spec, distance=distance), category, index, anchor) is not None:
+                kit.home.back_to(start)
+                return f"distance = {distance:g} is free"
     return ""

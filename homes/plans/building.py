@@ -135,7 +135,7 @@ def write_building(plan: Plan, scene: pathlib.Path, rng: random.Random) -> None:
     names: dict[str, Material] = {}
     for part, groups in (("wall", walls), ("floor", floors), ("ceiling", ceilings)):
         visuals, collisions = [], []
-        for k, (material, boxes) in enumerate(groups):
+        for k, (material, boxes) in enumerate((material, boxes) for material, boxes in groups if len(boxes)):
             name = f"{part}_{k}" if material.texture is not None else material.name
             name = next((known for known, other in names.items() if other is material), name)
             names[name] = material

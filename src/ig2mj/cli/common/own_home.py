@@ -26,12 +26,16 @@ if TYPE_CHECKING:
     from ig2mj_homes.own.own_home import OwnHome
 
     from ig2mj.sampling.conditions import Condition
+    from ig2mj.sampling.query import SceneQuery
     from ig2mj.sampling.row import Row, RowSampler
     from ig2mj.scene.manifest import ObjectEntry
     from ig2mj.scene.scene import Scene
 
 MAX_HULLS = 16
 """Convex pieces per link of the models of the catalogue, as in the homes that ship."""
+
+ATTEMPTS, STRIDE = 6, 1000
+"""Samples of an object until a robot can still get everywhere, and what is added to their number each time."""
 
 STEPS = ("placing furniture", "converting", "adding objects", "sampling", "checking")
 
@@ -178,6 +182,8 @@ def _converted(loose: Any, work: pathlib.Path) -> pathlib.Path:
 
 def _sample(home: OwnHome, folder: pathlib.Path) -> None:
     """Puts every loose object where its conditions hold, and makes the result the start of the home."""
+    from ig2mj_homes.own.own_home import unreachable
+
     from ig2mj.sampling.many import make_sampler
     from ig2mj.scene.manifest import save_manifest
     from ig2mj.scene.scene_folder import write_start
@@ -190,7 +196,16 @@ def _sample(home: OwnHome, folder: pathlib.Path) -> None:
     for number, (element, texts) in enumerate(_groups(home)):
         wanted = _read(home, scene, element, texts)
         if wanted:
-            row = _row(home, sampler, element, wanted, number)
+            for attempt in range(ATTEMPTS):
+                row = _row(home, sampler, element, wanted, number + attempt * STRIDE)
+                lost = unreachable(home, _boxes(home, sampler.query))
+                if not lost:
+                    break
+            else:
+                text = " and ".join(map(str, wanted))
+                problem = f"where {text} holds, a robot of 0.3 m radius has no way to {lost}"
+                raise home.description.error(element, problem, "give it another place")
+            assert row is not None
             sampler.start_from(row.physics, row.states)
             asked += wanted
     if row is None:
@@ -289,9 +304,7 @@ def _check(home: OwnHome, folder: pathlib.Path, closed: mujoco.MjModel) -> list[
     own = {piece.name for piece in home.pieces} | {loose.name for loose in home.loose}
     checks.append(_opens(closed, [o for o in scene.manifest.objects if o.name not in own and not o.parked]))
     query = SceneQuery(scene)
-    names = {loose.name for loose in home.loose}
-    boxes = [query.box(k) for k, name in enumerate(scene.object_names) if name in names]
-    lost = unreachable(home, np.array(boxes).reshape(-1, 2, 3))
+    lost = unreachable(home, _boxes(home, query))
     failures = [{"object": lost, "problem": "cannot be reached by a robot of 0.3 m radius"}] if lost else []
     summary = f"a robot of 0.3 m radius reaches {'not all of' if lost else 'all'} {len(home.rooms)} rooms"
     checks.append(CheckResult("reachable", not lost, summary, failures))
@@ -299,6 +312,13 @@ def _check(home: OwnHome, folder: pathlib.Path, closed: mujoco.MjModel) -> list[
     text = json.dumps(kept, indent=1, default=lambda value: value.tolist()) + "\n"
     (folder / "checks.json").write_text(text, encoding="utf-8", newline="\n")
     return checks
+
+
+def _boxes(home: OwnHome, query: SceneQuery) -> np.ndarray:
+    """[n, 2, 3] boxes around the loose objects, m."""
+    names = {loose.name for loose in home.loose}
+    boxes = [query.box(k) for k, name in enumerate(query.scene.object_names) if name in names]
+    return np.array(boxes).reshape(-1, 2, 3)
 
 
 def _opens(model: mujoco.MjModel, entries: Sequence[ObjectEntry]) -> CheckResult:
