@@ -88,7 +88,11 @@ def test_it_is_a_home_like_any_other(folder):
     assert [a.name for a in scene.additions] == ["mug_0", "cup_0"]
     assert SceneQuery(scene, NativeEngine(scene)).settle(10.0)
     worlds = ig2mj.Worlds(folder / "my_home", num_worlds=2, engine="native")
-    assert np.isfinite(np.asarray(worlds.step(worlds.reset(0)).view.object_pos)).all()
+    batch, _ = worlds.step(worlds.start(seed=0))
+    assert not np.asarray(batch.flags).any()
+    env = ig2mj.make("PointNavigation", home=folder / "my_home", worlds=1, engine="native", pool_size=2)
+    state = env.step(env.reset(0), np.zeros((1, len(env.action_names)), np.float32))
+    assert np.isfinite(np.asarray(state.reward)).all()
 
 
 def test_the_python_of_the_page_runs(folder, monkeypatch):
