@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pathlib
 import pickle
+import shutil
 
 import pytest
 from own_tasks import APPLE, write_task
@@ -14,8 +15,10 @@ from ig2mj.envs.names import refuse_path, short_name
 from ig2mj.envs.registry import find_task, list_envs
 from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
 from ig2mj.tasks.activities import ACTIVITIES
+from ig2mj.tasks.custom.checks import checked_names
 from ig2mj.tasks.custom.code import NOTEBOOK
 from ig2mj.tasks.custom.files import VARIABLE, import_file, registered_of, use_task
+from ig2mj.tasks.pools import starts_digest
 from ig2mj.tasks.registry import REGISTERED, split_reference
 from ig2mj.tasks.task import Task
 
@@ -293,3 +296,24 @@ def test_a_training_stops_at_a_reward_that_is_not_finite():
     _guard_rewards({"reward": 1.0, "reward/a": 2.0, "return": float("nan")}, None)
     with pytest.raises(Ig2mjError, match=r"my_tasks\.py: training stopped: the reward's term 'a' is nan"):
         _guard_rewards({"reward/a": float("nan")}, "my_tasks.py")
+
+
+def test_an_object_from_a_folder_next_to_the_file_takes_part(tmp_path, tiny_home_folder, cup):
+    shutil.copytree(cup, tmp_path / "cup")
+    text = """
+    import ig2mj
+
+    class CupToFloor(ig2mj.CustomTask):
+        home = "{home}"
+        objects = ("cup@on_top:table",)
+        goal = "(on_floor cup_0 kitchen_0)"
+        robots = ("humanoid",)
+    """
+    task = find_task(f"{write_task(tmp_path, tiny_home_folder, text)}:CupToFloor")
+    assert task.objects == (str(tmp_path / "cup"),) and task.start == ("(on_top cup_0 table)",)
+    assert checked_names(task).objects_of_interest == ("cup_0",)
+    before = starts_digest(task)
+    shutil.copytree(tmp_path, tmp_path.parent / "moved")
+    REGISTERED.clear()
+    moved = find_task(f"{tmp_path.parent / 'moved' / 'my_tasks.py'}:CupToFloor")
+    assert starts_digest(moved) == before and moved.code.digest == task.code.digest
