@@ -49,6 +49,6 @@ def register(gymnasium: Any) -> None:
                 full,
                 entry_point=f"{face}:GymEnv",
                 vector_entry_point=f"{face}:GymVectorEnv",
-                kwargs={"task": name},
+                kwargs={"task": REGISTERED[name].reference if name in REGISTERED else name},
                 disable_env_checker=True,  # it would reset and step once more than is needed; a test runs it
             )

@@ -85,6 +85,15 @@ def test_it_is_then_known_by_its_bare_name(file):
     assert short_name("AppleToFloor") == "AppleToFloor" and list_envs()[-1] == "AppleToFloor"
 
 
+def test_gymnasium_knows_it_by_name_and_file(file):
+    gymnasium = pytest.importorskip("gymnasium")
+    text = file.read_text().replace("class AppleToFloor", "@ig2mj.register_task\nclass AppleForGymnasium")
+    file.write_text(text)
+    find_task(f"{file}:AppleForGymnasium")
+    spec = gymnasium.registry.pop("ig2mj/AppleForGymnasium-v0")
+    assert spec.kwargs == {"task": f"{file.resolve()}:AppleForGymnasium"}
+
+
 def test_a_file_of_the_variable_is_known_by_name(file, monkeypatch):
     with pytest.raises(UnknownNameError):
         find_task("AppleToFloor")

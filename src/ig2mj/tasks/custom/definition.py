@@ -31,7 +31,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from ig2mj.agents.registry import make_robot
+from ig2mj.agents.registry import is_robot_folder, make_robot
 from ig2mj.errors import InputError, UnknownNameError
 from ig2mj.predicates import logic
 from ig2mj.predicates.parse import parse
@@ -70,8 +70,9 @@ class CustomTask:
       objects_of_interest: names of what the task is about, the first is what mittens take hold of; (): the objects that
         the goal names, loose ones first.
       distances: pairs of points whose distances the reward is made of without a method `reward`. weights: its weights.
-      robots: names of those that take part, the usual one first; each starts on free floor near the objects, and faces
-        them. Or by name where each starts: (x, y), (x, y, degrees) in m, or an `Acts`.
+      robots: names of those that take part, the usual one first, or folders that `ig2mj convert robot` wrote; each
+        starts on free floor near the objects, and faces them. Or by name where each starts: (x, y), (x, y, degrees) in
+        m, or an `Acts`.
       hands: number of the hands that act. whole_actions: an action has every number of the robot's controller, its
         drive among them, instead of the hands alone.
       grasping: mode unless another is asked for. horizon: agent steps until an episode is truncated.
@@ -123,6 +124,11 @@ class RegisteredTask:
 
     def __init__(self, definition: Any, name: str, file: str):
         self._definition, self.name, self.file = definition, name, file
+
+    @property
+    def reference(self) -> str:
+        """The name by which other processes of this machine find it: with its file, where it has one."""
+        return TaskCode(self.file, self.name).reference
 
     @functools.cached_property
     def task(self) -> AnyTask:
@@ -390,8 +396,9 @@ def _robots(own: CustomTask, code: TaskCode) -> dict[str, Acts]:
     places = given if isinstance(given, Mapping) else dict.fromkeys(_names(given))
     if not places:
         raise InputError(shown(code.file), "names no robot", element=element)
-    found = dict[str, Acts]()
-    for name, place in places.items():
+    found, folder = dict[str, Acts](), _folder(code)
+    for given_name, place in places.items():
+        name = str(folder / given_name) if is_robot_folder(str(folder / given_name)) else given_name
         if isinstance(place, Acts):
             found[name] = place
             continue

@@ -66,7 +66,7 @@ def refuse_unknown(name: str, file_name: object, file: object) -> None:
       file_name: of the code in which it is defined, as the file says; None: it is none of the user's.
 
     Raises:
-      InputError: it is in code that nobody has named.
+      InputError: it is in a file that was not named.
     """
     import_files()
     if file_name is None or name in REGISTERED:
@@ -74,7 +74,8 @@ def refuse_unknown(name: str, file_name: object, file: object) -> None:
     problem = f"its task {name} is defined in {file_name}, which is read only where you name it"
     bddl = str(file_name).endswith(DEFINITION)
     reference = f"{PREFIX}PATH/{file_name}" if bddl else f"PATH/{file_name}:{name}"
-    fix = f"--task {reference}; in Python, ig2mj.tasks.custom.files.use_task"
+    fix = f"--task {reference}; in Python, import the file in which @ig2mj.register_task registers it"
+    fix = f"--task {reference}" if bddl else fix
     raise InputError(file, problem, fix=fix)
 
 
