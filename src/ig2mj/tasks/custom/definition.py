@@ -38,7 +38,7 @@ from ig2mj.predicates.parse import parse
 from ig2mj.scene.paths import MANIFEST_FILE, scene_folder
 from ig2mj.tasks.added_objects import with_objects
 from ig2mj.tasks.bddl.task import PREFIX, BddlTask, bddl_task
-from ig2mj.tasks.custom.code import NOTEBOOK, TaskCode, blamed, shown
+from ig2mj.tasks.custom.code import NOTEBOOK, TaskCode, blamed, call, shown
 from ig2mj.tasks.custom.digest import digest_in, digest_of_object
 from ig2mj.tasks.homes import AnyTask
 from ig2mj.tasks.navigation.task import NavigationTask
@@ -238,10 +238,7 @@ def _check_names(kind: type, where: str) -> None:
 def _task(definition: Any, name: str, file: str, digest: str) -> AnyTask:
     code = TaskCode(file, name, digest)
     if callable(definition) and not isinstance(definition, type):
-        try:
-            definition = definition()
-        except Exception as e:
-            raise InputError(shown(file), f"{type(e).__name__}: {e}", element=name) from e
+        definition = call(definition)
     if isinstance(definition, type):
         try:
             definition = definition()
