@@ -30,3 +30,15 @@ def write_object(folder: pathlib.Path, name: str, text: str, **options) -> pathl
     given = {"category": "mug", **options}
     convert_object(urdf, given.pop("category"), folder / name, options=ConvertOptions(report=False), **given)
     return folder / name
+
+
+TABLE = """<robot name="side_table"><link name="base_link">
+<visual><origin xyz="0 0 0.25"/><geometry><box size="0.4 0.6 0.5"/></geometry>
+<material name="clay"><color rgba="0.3 0.45 0.6 1"/></material></visual>
+<collision><origin xyz="0 0 0.25"/><geometry><box size="0.4 0.6 0.5"/></geometry></collision>
+</link></robot>"""
+
+
+def write_table(folder: pathlib.Path, name: str = "side_table") -> pathlib.Path:
+    """The folder `name` of a fixed table, 0.5 m high, whose front looks along x."""
+    return write_object(folder, name, TABLE, category="coffee_table", fixed=True)

@@ -13,6 +13,8 @@ import ig2mj
 from ig2mj import cli
 from ig2mj.errors import Ig2mjError, UnknownNameError
 from ig2mj.scene.changes import Change, changes_of, read_change
+from ig2mj.scene.found_again import entries_of, requests_again
+from ig2mj.tasks.added_objects import object_texts
 from ig2mj.worlds.pool import load_pool, load_pool_scene
 
 
@@ -110,6 +112,7 @@ def test_commands_take_changes(table, capsys):
         ({"remove": "mg_0"}, "no object of small_home is named 'mg_0'; near matches: mug_0"),
         ({"remove": "walls"}, "'walls' is a part of the house"),
         ({"remove": "apple_0_part_0"}, "a part of apple_0 and cannot be taken out; take apple_0"),
+        ({"remove": "breakfast_table_0", "replace": {"mug_0": "cup"}}, "what it stands on is removed"),
         ({"remove": ["mug_0", "mug_0"]}, "'mug_0' is removed or replaced twice"),
         ({"replace": {"mug_0": "nothing"}}, "no category of the object library is named 'nothing'"),
         ({"replace": {"bowl_0": "pool"}}, "the object in place of 'bowl_0' stands"),
@@ -136,3 +139,11 @@ def test_a_change_is_told_from_an_object_to_add(tmp_path, monkeypatch):
 def test_the_home_is_changed_in_environments(table):
     with pytest.raises(UnknownNameError, match="object of"):
         ig2mj.make("CookingMeat", objects=["remove:nothing_0"])
+
+
+def test_files_that_were_made_with_changes_give_them_back(table):
+    scene = ig2mj.load_scene("small_home", objects=["mug"], remove="mug_0")
+    found = requests_again(scene.requested, entries_of(scene.additions), "a file")
+    assert list(found) == scene.requested
+    assert requests_again(["remove:mug_0"], [], "a file") == ("remove:mug_0",)
+    assert object_texts(["remove:mug_0", f"replace:bowl_0={table}"])[0] == "remove:mug_0"

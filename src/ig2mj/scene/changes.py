@@ -134,6 +134,8 @@ def take_out(
     replaced = {c.name: find_model(c.instead) for c in changes if c.instead is not None}
     bearing = home.bearing()
     gone = _above([c.name for c in changes if c.instead is None] + list(also), bearing)
+    if left := sorted(gone & set(replaced)):
+        raise Ig2mjError(f"'{left[0]}' is replaced, and what it stands on is removed: remove it, too, or keep that")
     onto = _above(list(replaced), bearing) - set(replaced)
     fixed = {name for name in onto if entries[name].fixed}
     gone = (gone | fixed | _above(list(fixed), bearing)) - set(replaced)
