@@ -67,7 +67,7 @@ def test_annotations_work_the_hot_plate_of_the_guide_cooks(repository, tiny_home
     urdf, toml = (re.search(rf"```{kind}\n(.*?)```", text, re.DOTALL)[1] for kind in ("xml", "toml"))
     (tmp_path / "plate.toml").write_text(toml)
     plate = write_object(tmp_path, "hot_plate", urdf, category="hot_plate", annotations=tmp_path / "plate.toml")
-    wanted = [f"{plate}@0,0,0.4,0", "steak@loose:0,0,0.52,0"]
+    wanted = [f"{plate}@fixed:0.5,0.25,1,0", "steak@loose:0.5,0.25,1.1,0"]
     simulation = ig2mj.Simulation(tiny_home_folder, objects=wanted)
     simulation.set_state("toggled_on", "hot_plate_0", True)
     simulation.step(count=300)
