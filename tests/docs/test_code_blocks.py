@@ -78,6 +78,7 @@ LONG = {
     "index",
     "README",
     "planning",
+    "homes",
 }
 """Pages whose blocks take ten seconds or more together: run by `make test-slow`."""
 
