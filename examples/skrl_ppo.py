@@ -13,6 +13,7 @@ from skrl.memories.torch import RandomMemory
 from skrl.models.torch import DeterministicMixin, GaussianMixin, Model
 from skrl.resources.preprocessors.torch import RunningStandardScaler
 from skrl.trainers.torch import SequentialTrainer
+from skrl.utils import set_seed
 from torch import nn
 
 import ig2mj.envs.gymnasium  # noqa: F401  makes the environments known to Gymnasium
@@ -43,8 +44,9 @@ class Value(DeterministicMixin, Model):
         return self.net(inputs["observations"]), {}
 
 
-def trained(task: str, worlds: int, steps: int, **options: Any) -> PPO:
-    """PPO after so many steps of every world. `options`: of `ig2mj.make`."""
+def trained(task: str, worlds: int, steps: int, seed: int = 0, **options: Any) -> PPO:
+    """PPO after so many steps of every world, with a progress bar. `options`: of `ig2mj.make`."""
+    set_seed(seed)
     env = wrap_env(gymnasium.make_vec(f"ig2mj/{task}-v0", num_envs=worlds, **options), wrapper="gymnasium")
     spaces = {"observation_space": env.observation_space, "action_space": env.action_space, "state_space": None}
     models = {"policy": Policy(**spaces, device=env.device), "value": Value(**spaces, device=env.device)}
@@ -71,5 +73,6 @@ if __name__ == "__main__":
     parser.add_argument("--task", default="PointNavigation")
     parser.add_argument("--worlds", type=int, default=16)
     parser.add_argument("--steps", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
-    trained(arguments.task, arguments.worlds, arguments.steps)
+    trained(arguments.task, arguments.worlds, arguments.steps, arguments.seed)

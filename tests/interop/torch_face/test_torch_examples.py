@@ -1,4 +1,4 @@
-"""The examples with PyTorch, Stable-Baselines3 and skrl train in native worlds, as users run them, only shorter."""
+"""The examples with PyTorch, Stable-Baselines3, skrl and rsl_rl train in native worlds as users run them, shorter."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import torch
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "examples"))
 
+import rsl_rl_ppo
 import sb3_ppo
 import skrl_ppo
 import torch_loop
@@ -68,3 +69,20 @@ def test_skrl_trains():
     before, after = skrl_ppo.Policy, agent.models["policy"]
     assert isinstance(after, before) and all(torch.isfinite(p).all() for p in after.parameters())
     assert (after.log_std != -1.0).any()  # it has learnt
+
+
+def test_rsl_rl_trains_and_says_how_far_it_is(capsys):
+    runner = rsl_rl_ppo.trained(TASK, WORLDS, 2, seed=1, length=16, engine="native", pool_size=8)
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("iteration")]
+    assert [line.split(":")[0] for line in lines] == ["iteration 1 of 2", "iteration 2 of 2"]
+    assert all(torch.isfinite(p).all() for p in runner.alg.get_policy().parameters())
+
+
+def test_rsl_rl_is_told_which_episodes_ran_out_of_time():
+    short = ig2mj.make(TASK, worlds=WORLDS, engine="native", pool_size=8).with_horizon(3)
+    worlds = rsl_rl_ppo.Worlds(TorchEnv(short), seed=3)
+    for _ in range(3):
+        obs, reward, done, extras = worlds.step(torch.zeros((WORLDS, worlds.num_actions)))
+    assert done.all() and extras["time_outs"].all() and worlds.ended == WORLDS
+    assert obs["policy"].shape == worlds.get_observations()["policy"].shape and reward.shape == (WORLDS,)
+    assert (worlds.episode_length_buf == 0).all()
