@@ -20,6 +20,9 @@ from ig2mj.predicates.literals import object_index, room_index
 from ig2mj.sampling.placement import Placer
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.rules import PLACEMENTS
+from ig2mj.states.definitions.dust import DUST
+from ig2mj.states.definitions.stain import STAIN
+from ig2mj.states.particles import world_normals, world_positions
 
 RADIUS, CORNER, BEHIND, ALONG = 0.03, 0.03, 0.014, (0.07, 0.1)
 """m: of the spheres of a hand: radius; of the palm's corners from its middle, along the fingers and across; of the palm
@@ -27,6 +30,9 @@ behind the grasp point; of the fingers ahead of it."""
 
 HELD_POINTS, HELD_MARGIN = 60, 0.012
 """Points of what a hand holds that keep clear, and m by which they do."""
+
+EACH = 3
+"""Spots of a placement in each area of its rule."""
 
 Vector = Float[np.ndarray, "3"]
 
@@ -37,6 +43,15 @@ class Stance:
 
     xy: tuple[float, float]
     yaw: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class DirtSpot:
+    """A particle of dust or of a stain: its number, where it is, and the normal of the face; world frame."""
+
+    number: int
+    pos: Vector
+    normal: Vector
 
 
 @dataclasses.dataclass(eq=False)
@@ -204,6 +219,20 @@ class PlannedWorld:
                 if len(taken) >= most:
                     return
 
+    def dirt(self, predicate: str, name: str) -> list[DirtSpot]:
+        """Particles that are left on an object: of dust for "dusty", of stains for "stained"; the nearest first."""
+        kind = DUST if predicate == "dusty" else STAIN
+        row = kind.row_of(self.domain.model, self.index(name))
+        if row is None:
+            return []
+        rows = getattr(self.stage.states, kind.name)
+        pos = np.asarray(world_positions(rows, self.view))[self.world, row].astype(float)
+        normal = np.asarray(world_normals(rows, self.view))[self.world, row].astype(float)
+        alive = np.flatnonzero(np.asarray(rows.alive)[self.world, row])
+        here, _ = self.base
+        order = sorted(alive.tolist(), key=lambda n: float(np.linalg.norm(pos[n, :2] - here)))
+        return [DirtSpot(n, pos[n], normal[n]) for n in order]
+
     def spots(self, predicate: str, name: str, where: str, turns: Sequence[float]) -> Iterator[tuple[Vector, float]]:
         """Positions of an object's main body that make a placement true, for turns (rad) of it about the vertical."""
         self.query.load(self.stage.snapshot(self.world))
@@ -216,12 +245,10 @@ class PlannedWorld:
             new = _yawed(quat, turn)
             for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
                 found = 0
-                for pos in placer.spots(index, areas, new, self.rng, support):
+                for pos in placer.spots(index, areas, new, self.rng, support, each=EACH):
                     if predicate in ("on_top", "on_floor") or self._would_hold(predicate, name, where, pos, new):
                         found += 1
                         yield pos, turn
-                    if found >= 8:
-                        break
                 if found:
                     break
 

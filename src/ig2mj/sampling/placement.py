@@ -260,17 +260,18 @@ class Placer:
         rng: np.random.Generator,
         support: str = "full",
         most: int = AREAS,
+        each: int | None = None,
     ) -> Iterator[Float[np.ndarray, "3"]]:
         """Positions of an object's main body in a given orientation (world frame, w-x-y-z) at which it rests in the
         areas of a rule when it is lowered; nothing is moved, and no physics is run.
 
         Args:
-          support: one of `SUPPORT`. most: areas that are looked at.
+          support: one of `SUPPORT`. most: areas that are looked at. each: positions of an area; None: all.
         """
         shape = self.query.footprint(object_index, quat, rng.uniform(-CELL / 2, CELL / 2, 2))
         for area in itertools.islice(areas(shape, rng), most):
             rest = self._candidates(object_index, rng, collections.Counter(), shape, area, support)
-            for n in rng.permutation(len(rest.row)):
+            for n in rng.permutation(len(rest.row))[:each]:
                 yield origin(shape, int(rest.row[n]), int(rest.col[n]), float(rest.height[n]))
 
     def _candidates(
