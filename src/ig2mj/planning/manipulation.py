@@ -668,11 +668,14 @@ def _hold_at(
         return world.com(name) if link < 0 else np.asarray(world.view.link_pos)[world.world, link].astype(float)
 
     for point in points:
-        target = point - part() + world.grip(hand)
         obstacles, floor = world.obstacles([name]), world.floor()
-        for stance in world.stances(hand, target, floor, AWAY):
+        for stance in world.stances(hand, point - part() + world.grip(hand), floor, AWAY):
             ahead, _ = _directions(stance, "down")
             _, now = world.base
+            c, s = np.cos(stance.yaw - now), np.sin(stance.yaw - now)
+            target = point + np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (world.grip(hand) - part())
+            if not world.reaches(hand, stance, target):
+                continue
             spheres = world.spheres(ahead, holding=name, hand=hand, turn=stance.yaw - now)
             if hand_way(obstacles, spheres, world.carried(hand, stance), target) is None:
                 continue
