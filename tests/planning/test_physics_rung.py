@@ -13,20 +13,37 @@ def simulation_of(folder, robot, **options):
     return ig2mj.Simulation(ig2mj.load_scene(folder, agents=[robot]), **options)
 
 
+def done(simulation, *requests):
+    """Carries out primitives, and asserts that each succeeds."""
+    for request in requests:
+        outcome = simulation.agent.do(*request.split())
+        assert outcome.done, f"{request}: {outcome}"
+
+
 @pytest.mark.slow
-def test_the_humanoid_takes_an_apple_puts_it_on_the_table_and_works_a_cabinet(tiny_home_folder):
+def test_the_humanoid_puts_an_apple_on_the_table_and_switches_a_stove_on(tiny_home_folder):
     simulation = simulation_of(tiny_home_folder, Humanoid().at(-1.4, -1.2, 0.0), grasping="assisted")
-    agent = simulation.agent
-    for primitive, *arguments in (
-        ("navigate_to", "apple"),
-        ("grasp", "ball"),
-        ("place_on_top", "ball", "table"),
-        ("toggle_on", "stove"),
-    ):
-        outcome = agent.do(primitive, *arguments)
-        assert outcome.done, f"{primitive} {arguments}: {outcome}"
-    assert simulation.predicate("on_top", "ball", "table") and simulation.predicate("toggled_on", "stove")
-    assert agent.facts.held == ()
+    done(simulation, "grasp apple", "place_on_top apple table", "toggle_on stove")
+    assert simulation.predicate("on_top", "apple", "table") and simulation.predicate("toggled_on", "stove")
+    assert simulation.agent.facts.held == ()
+    assert "no hand holds apple" in simulation.agent.do("place_inside", "apple", "cabinet").detail
+
+
+@pytest.mark.slow
+def test_the_humanoid_wipes_dust_off_a_table(tiny_home_folder):
+    simulation = simulation_of(tiny_home_folder, Humanoid().at(-1.4, -1.2, 0.0), grasping="assisted")
+    simulation.set_state("dusty", "table", True)
+    done(simulation, "grasp sponge", "wipe table sponge")
+    assert not simulation.predicate("dusty", "table") and simulation.agent.facts.held == ("sponge",)
+
+
+@pytest.mark.slow
+def test_the_humanoid_cuts_an_apple_and_opens_and_closes_a_cabinet(tiny_home_folder):
+    simulation = simulation_of(tiny_home_folder, Humanoid().at(-1.4, -1.2, 0.0), grasping="assisted")
+    done(simulation, "grasp knife", "slice apple knife", "release knife", "open cabinet")
+    assert simulation.predicate("sliced", "apple") and simulation.predicate("open", "cabinet")
+    done(simulation, "close cabinet")
+    assert not simulation.predicate("open", "cabinet")
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.agents.base import Controller
-from ig2mj.agents.humanoid.frames import HAND_REACH, SHOULDER_POS
+from ig2mj.agents.humanoid.frames import HAND_POS, HAND_QUAT, HAND_REACH, SHOULDER_POS
 from ig2mj.agents.task_robot import HandControl, TaskRobot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import (
@@ -162,8 +162,8 @@ class HoveringBody(_Body):
     """The humanoid: a body that moves in any direction, and hands whose targets are displaced in its frame.
 
     Attributes:
-      reach: m from a shoulder that a hand goes. shoulders, carry: [H, 3] m, in the body's frame: of the shoulders, and
-        where hands carry things.
+      reach: m from a shoulder that a hand goes. shoulders, carry, rest: [H, 3] m, in the body's frame: of the
+        shoulders, and of the grasp points where hands carry things and where empty hands rest.
     """
 
     sideways = True
@@ -174,6 +174,9 @@ class HoveringBody(_Body):
         self._stands = float(robot.stands) if isinstance(robot, TaskRobot) else 0.0
         self.reach, self.shoulders = HAND_REACH - SPARE_REACH, np.array(SHOULDER_POS)
         self.carry = np.array([[CARRY[0], side * CARRY[1], CARRY[2]] for side in (1, -1)])
+        self.rest = np.array(HAND_POS) + np.stack(
+            [np.asarray(quat_rotate(q, g)) for q, g in zip(HAND_QUAT, self.grips, strict=True)]
+        )
 
     def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
         action = np.tile(self._rest, (len(senses.base_pos), 1))
@@ -232,8 +235,8 @@ class HoveringBody(_Body):
         return move, turn
 
 
-SPARE_REACH, CARRY = 0.08, (0.42, 0.16, 0.2)
-"""m that are left of an arm's reach; forwards, to the side and up: where a hand carries what it holds."""
+SPARE_REACH, CARRY = 0.08, (0.34, 0.16, 0.5)
+"""m that are left of an arm's reach; forwards, to the side and up: where a hand carries what it holds, above tables."""
 
 SPEED_OF_BASE = 0.05
 """m in an agent step of a base that moves together with a hand."""

@@ -125,9 +125,9 @@ def _travel(world: PlannedWorld, hand: int, points: Sequence[Vector], quat, keep
     ]
 
 
-def _carry(world: PlannedWorld, hand: int, keeps: int = -1) -> Phase:
+def _carry(world: PlannedWorld, hand: int, keeps: int = -1, name: str = "") -> Phase:
     return Phase(
-        hand=hand, pos=_tuple(world.body.carry[hand]), in_body=True, keeps=keeps, tolerance=0.08, limit=40, after=""
+        hand=hand, pos=_tuple(world.carry(hand, name)), in_body=True, keeps=keeps, tolerance=0.08, limit=40, after=""
     )
 
 
@@ -197,7 +197,7 @@ def grasp(world: PlannedWorld, step: Step) -> Primitive:
             Phase(hand=hand, pos=_tuple(point + ABOVE * -DOWN), keeps=index, close=True, tolerance=0.04, limit=30,
                   after="", speed=0.03),
             *_travel(world, hand, way[-2::-1], None, keeps=index),
-            _carry(world, hand, keeps=index),
+            _carry(world, hand, keeps=index, name=name),
         ]  # fmt: skip
         reason = yield program
         if name in world.held:
@@ -217,7 +217,7 @@ def _plan_grasp(world: PlannedWorld, name: str, hand: int, attempt: int) -> tupl
     for point in _tops(world, name):
         for stance in world.stances(hand, point, floor, AWAY):
             fingers, _ = _directions(stance, "down")
-            way = hand_way(obstacles, world.spheres(fingers), world.carried(hand, stance), point + ABOVE * -DOWN)
+            way = hand_way(obstacles, world.spheres(fingers), world.resting(hand, stance), point + ABOVE * -DOWN)
             if way is None or not straight(obstacles, world.spheres(fingers)[:5], way[-1], point, PALM_SPARE):
                 continue
             found += 1
@@ -533,7 +533,7 @@ def _plan_touch(world: PlannedWorld, point: Vector, hand: int, attempt: int) -> 
         fingers, _ = _directions(stance, "down")
         for offset in (-fingers * (NEAR_BUTTON + FINGER), -DOWN * NEAR_BUTTON - fingers * FINGER):
             aim = point + offset
-            if hand_way(obstacles, world.spheres(fingers), world.carried(hand, stance), aim) is not None:
+            if hand_way(obstacles, world.spheres(fingers), world.resting(hand, stance), aim) is not None:
                 found += 1
                 if found > attempt:
                     return stance, aim
@@ -578,7 +578,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
     return clean
 
 
-WIPES, AT_ONCE, PRESSED, LIFTED, TOP = 8, 8, 0.012, 0.06, -0.3
+WIPES, AT_ONCE, PRESSED, LIFTED, TOP = 8, 8, 0.02, 0.06, -0.3
 """Rounds of wiping; particles of a round; m that a tool is pressed into a face, and lifted off it between particles;
 smallest z of the normal of a face that is wiped."""
 
@@ -635,11 +635,11 @@ def _wipe_program(world: PlannedWorld, spots: Sequence[DirtSpot], tool: str, han
             continue
         program += _travel(world, hand, way, None, keeps=keeps)
         program += [
-            Phase(hand=hand, pos=_tuple(target), keeps=keeps, tolerance=0.015, limit=12, after="", speed=0.03),
+            Phase(hand=hand, pos=_tuple(target), keeps=keeps, tolerance=0.004, limit=6, after="", speed=0.04),
             Phase(hand=hand, pos=_tuple(before), keeps=keeps, tolerance=0.03, limit=12, after=""),
         ]
         at = before
-    return program
+    return [*program, _carry(world, hand, keeps)] if program else program
 
 
 def _wait(

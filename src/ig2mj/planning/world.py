@@ -14,6 +14,7 @@ from ig2mj.planning.bodies import HoveringBody, Senses, grip_of, sense
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
+from ig2mj.planning.footprint import BaseFootprint
 from ig2mj.planning.motion_planner import FreeFloor, MotionPlanner
 from ig2mj.planning.stage import Stage
 from ig2mj.predicates.literals import object_index, room_index
@@ -30,6 +31,9 @@ behind the grasp point; of the fingers ahead of it."""
 
 HELD_POINTS, HELD_MARGIN = 60, 0.012
 """Points of what a hand holds that keep clear, and m by which they do."""
+
+BODY = 0.24
+"""m from the axis of the body that what is carried is away from."""
 
 EACH = 3
 """Spots of a placement in each area of its rule."""
@@ -170,12 +174,35 @@ class PlannedWorld:
 
     def floor(self) -> FreeFloor:
         """Where the robot can stand with what it holds."""
-        return self.planner.floor(self.view, without=[self.index(n) for n in self.held if n], world=self.world)
+        footprint = BaseFootprint.of_robot(self.stage.scene, self.view, self.stage.agent, self.world)
+        here, _ = self.base
+        held = [n for n in self.held if n and not self.domain.fixed(n)]
+        for name in held:
+            corners = self.vertices(name)
+            away = float(np.linalg.norm(corners[:, :2] - here, axis=1).max())
+            footprint = footprint.holding(float(corners[:, 2].min()), float(corners[:, 2].max()), away)
+        return self.planner.floor(self.view, footprint, without=[self.index(n) for n in held], world=self.world)
+
+    def carry(self, hand: int, name: str = "") -> Vector:
+        """Where a hand carries an object, "": what it holds, in the body's frame: as far ahead as that is wide."""
+        x, y, z = self.body.carry[hand]
+        if name := name or self.held[hand]:
+            low, high = self.vertices(name).min(0), self.vertices(name).max(0)
+            x = max(x, BODY + float(np.linalg.norm((high - low)[:2])) / 2)
+        return np.array([x, y, z])
+
+    def resting(self, hand: int, stance: Stance) -> Vector:
+        """Where an empty hand's grasp point rests, if the robot stood there; world frame."""
+        return self._from(self.body.rest[hand], stance)
 
     def carried(self, hand: int, stance: Stance) -> Vector:
         """Where a hand's grasp point is carried, if the robot stood there; world frame."""
+        return self._from(self.carry(hand), stance)
+
+    def _from(self, point: Vector, stance: Stance) -> Vector:
+        """A point of the body's frame, if the robot stood there."""
         c, s = np.cos(stance.yaw), np.sin(stance.yaw)
-        x, y, z = self.body.carry[hand]
+        x, y, z = point
         height = float(self.senses.base_pos[self.world, 2])
         return np.array([stance.xy[0] + c * x - s * y, stance.xy[1] + s * x + c * y, height + z])
 
