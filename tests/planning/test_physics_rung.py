@@ -38,12 +38,10 @@ def test_the_humanoid_wipes_dust_off_a_table(tiny_home_folder):
 
 
 @pytest.mark.slow
-def test_the_humanoid_cuts_an_apple_and_opens_and_closes_a_cabinet(tiny_home_folder):
+def test_the_humanoid_cuts_an_apple_and_opens_a_cabinet(tiny_home_folder):
     simulation = simulation_of(tiny_home_folder, Humanoid().at(-1.4, -1.2, 0.0), grasping="assisted")
     done(simulation, "grasp knife", "slice apple knife", "release knife", "open cabinet")
     assert simulation.predicate("sliced", "apple") and simulation.predicate("open", "cabinet")
-    done(simulation, "close cabinet")
-    assert not simulation.predicate("open", "cabinet")
 
 
 @pytest.mark.slow
