@@ -8,44 +8,38 @@ another stance, grasp or spot, and ends by the predicate that it is for.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 
 import numpy as np
 
 from ig2mj.planning.clearance import Obstacles, hand_way, straight
 from ig2mj.planning.joints import AJAR, OPEN_TO, OpenableJoint, openable_joints
-from ig2mj.planning.phases import Base, Phase, Until
+from ig2mj.planning.moves import (
+    ABOVE,
+    ATTEMPTS,
+    AWAY,
+    BELOW,
+    DOWN,
+    LET_GO,
+    RETREAT,
+    Primitive,
+    PrimitiveFailed,
+    Program,
+    carry,
+    directions,
+    free_hand,
+    go,
+    hand_with,
+    quaternion,
+    rest,
+    travel,
+    vector3,
+)
+from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import DirtSpot, PlannedWorld, Stance, Vector
+from ig2mj.planning.treatments import clean, cook, freeze, slice_, soak
+from ig2mj.planning.world import PlannedWorld, Stance, Vector
 from ig2mj.scene.tables import LinkKind
-
-Program = list[Phase]
-Primitive = Generator[Program, str, Outcome]
-
-ATTEMPTS = 4
-"""Tries of a primitive."""
-
-ABOVE, BELOW = 0.12, 0.03
-"""m: above a grasp at which a hand comes to it, and below an object's top that it goes for, until it touches."""
-
-LET_GO = 0.015
-"""m above its place at which an object is let go."""
-
-AWAY = 0.55
-"""m that a base would like to be from what its hand does."""
-
-RETREAT = 0.12
-"""m that a hand goes back after it has let go."""
-
-DOWN = np.array([0.0, 0.0, -1.0])
-
-
-@dataclasses.dataclass(frozen=True)
-class _Failed(Exception):
-    """A primitive cannot go on."""
-
-    reason: str
-    detail: str
 
 
 def primitive(world: PlannedWorld, step: Step) -> Primitive:
@@ -64,34 +58,8 @@ def _refused(detail: str) -> Primitive:
 def _guarded(inner: Primitive) -> Primitive:
     try:
         return (yield from inner)
-    except _Failed as e:
+    except PrimitiveFailed as e:
         return Outcome(e.reason, e.detail)
-
-
-# Moving the base.
-
-
-def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
-    """Drives to a stance; returns the reason why it did not get there."""
-    here, yaw = world.base
-    apart = float(np.linalg.norm(here - stance.xy))
-    turned = abs((yaw - stance.yaw + np.pi) % (2 * np.pi) - np.pi)
-    if apart < 0.04 and turned < 0.1:
-        return ""
-    plan = world.floor().way(here, stance.xy)
-    if plan is None:
-        return "no_path"
-    return (yield drive(plan, stance.yaw))
-
-
-def drive(points: np.ndarray, yaw: float | None) -> Program:
-    """The program that follows a way, and at its end turns."""
-    program = [Phase(Base.DRIVE, xy=(float(x), float(y)), tolerance=0.08) for x, y in points[1:]]
-    if program:
-        program[-1] = dataclasses.replace(program[-1], tolerance=0.025)
-    if yaw is not None:
-        program.append(Phase(Base.TURN, yaw=float(yaw), turn_tolerance=0.06, limit=60))
-    return program
 
 
 def navigate_to(world: PlannedWorld, step: Step) -> Primitive:
@@ -99,64 +67,10 @@ def navigate_to(world: PlannedWorld, step: Step) -> Primitive:
     point, reason = world.com(step.object), "no_base"
     hands = range(len(world.body.hands))
     for stance in world.stances(max(hands), point, world.floor(), AWAY):
-        reason = yield from _go(world, stance)
+        reason = yield from go(world, stance)
         if not reason:
             return Outcome()
     return Outcome(reason, f"{step.object} is not within reach of free floor" if reason == "no_base" else "")
-
-
-# Hands.
-
-
-def _directions(stance: Stance, kind: str) -> tuple[Vector, Vector]:
-    """Where fingers point and the palm faces, world frame: "down": onto something, "front": against a face."""
-    ahead = np.array([np.cos(stance.yaw), np.sin(stance.yaw), 0.0])
-    return (ahead, DOWN) if kind == "down" else (-DOWN, ahead)
-
-
-def _travel(world: PlannedWorld, hand: int, points: Sequence[Vector], quat, keeps: int = -1) -> Program:
-    """Phases of a hand along points of a way."""
-    last = len(points) - 1
-    return [
-        Phase(
-            hand=hand, pos=_tuple(p), quat=quat, keeps=keeps, tolerance=0.04 if k < last else 0.025, limit=60, after=""
-        )
-        for k, p in enumerate(points)
-    ]
-
-
-def _carry(world: PlannedWorld, hand: int, keeps: int = -1, name: str = "") -> Phase:
-    return Phase(
-        hand=hand, pos=_tuple(world.carry(hand, name)), in_body=True, keeps=keeps, tolerance=0.08, limit=40, after=""
-    )
-
-
-def _rest(hand: int) -> Program:
-    """The open hand goes back to where it rests."""
-    return [Phase(hand=hand, reset=True, close=False, until=Until.WAITED, limit=4)]
-
-
-def _free_hand(world: PlannedWorld, attempt: int = 0) -> int:
-    free = [h for h, name in enumerate(world.held) if not name]
-    if not free:
-        raise _Failed("no_grasp", f"the hands are full: {', '.join(world.held)}")
-    return free[::-1][attempt % len(free)]
-
-
-def _hand_with(world: PlannedWorld, name: str) -> int:
-    if name not in world.held:
-        raise _Failed("no_grasp", f"no hand holds {name}")
-    return world.held.index(name)
-
-
-def _tuple(v) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in v)
-    return (x, y, z)
-
-
-def _quat(q) -> tuple[float, float, float, float]:
-    w, x, y, z = (float(c) for c in q)
-    return (w, x, y, z)
 
 
 # Grasp and release.
@@ -172,40 +86,40 @@ def grasp(world: PlannedWorld, step: Step) -> Primitive:
         return Outcome("no_grasp", f"{name} is fixed, or its category allows no assisted grasp")
     reason, detail = "no_grasp", ""
     for attempt in range(ATTEMPTS):
-        hand = _free_hand(world, attempt)
+        hand = free_hand(world, attempt)
         found = _plan_grasp(world, name, hand, attempt)
         if found is None:
             reason, detail = "no_base", f"no free floor from which a hand has a way to {name}"
             continue
         stance, point, _ = found
-        if reason := (yield from _go(world, stance)):
+        if reason := (yield from go(world, stance)):
             continue
         here, yaw = world.base
         stance = Stance((float(here[0]), float(here[1])), yaw)
-        fingers, palm = _directions(stance, "down")
+        fingers, palm = directions(stance, "down")
         quat = world.body.turned(hand, fingers, palm)
         way = hand_way(world.obstacles([name]), world.spheres(fingers), world.grip(hand), point + ABOVE * -DOWN)
         if way is None:
             reason, detail = "no_path", f"the hand has no way to {name}"
             continue
         program = [
-            *_travel(world, hand, way, quat),
-            Phase(hand=hand, pos=_tuple(point + BELOW * DOWN), quat=quat, until=Until.TOUCHED, object=index,
+            *travel(world, hand, way, quat),
+            Phase(hand=hand, pos=vector3(point + BELOW * DOWN), quat=quat, until=Until.TOUCHED, object=index,
                   close=False, limit=25, after="", speed=0.03),
-            Phase(hand=hand, pos=_tuple(point + BELOW * DOWN), quat=quat, until=Until.HELD, object=index, close=True,
+            Phase(hand=hand, pos=vector3(point + BELOW * DOWN), quat=quat, until=Until.HELD, object=index, close=True,
                   limit=15, after="no_grasp", speed=0.02),
-            Phase(hand=hand, pos=_tuple(point + ABOVE * -DOWN), keeps=index, close=True, tolerance=0.04, limit=30,
+            Phase(hand=hand, pos=vector3(point + ABOVE * -DOWN), keeps=index, close=True, tolerance=0.04, limit=30,
                   after="", speed=0.03),
-            *_travel(world, hand, way[-2::-1], None, keeps=index),
-            _carry(world, hand, keeps=index, name=name),
+            *travel(world, hand, way[-2::-1], None, keeps=index),
+            carry(world, hand, keeps=index, name=name),
         ]  # fmt: skip
         reason = yield program
         if name in world.held:
             return Outcome(attempts=attempt + 1)
         detail = f"the hand closed on {name} and does not hold it" if reason == "no_grasp" else ""
         yield [
-            Phase(hand=hand, close=False, pos=_tuple(world.grip(hand) + ABOVE * -DOWN), limit=10, after=""),
-            *_rest(hand),
+            Phase(hand=hand, close=False, pos=vector3(world.grip(hand) + ABOVE * -DOWN), limit=10, after=""),
+            *rest(hand),
         ]
     return Outcome(reason or "no_grasp", detail, attempts=ATTEMPTS)
 
@@ -216,7 +130,7 @@ def _plan_grasp(world: PlannedWorld, name: str, hand: int, attempt: int) -> tupl
     found = 0
     for point in _tops(world, name):
         for stance in world.stances(hand, point, floor, AWAY):
-            fingers, _ = _directions(stance, "down")
+            fingers, _ = directions(stance, "down")
             way = hand_way(obstacles, world.spheres(fingers), world.resting(hand, stance), point + ABOVE * -DOWN)
             if way is None or not straight(obstacles, world.spheres(fingers)[:5], way[-1], point, PALM_SPARE):
                 continue
@@ -253,8 +167,8 @@ def _tops(world: PlannedWorld, name: str) -> list[Vector]:
 
 def release(world: PlannedWorld, step: Step) -> Primitive:
     """Opens the hand, wherever it is."""
-    hand = _hand_with(world, step.object)
-    reason = yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=15), *_rest(hand)]
+    hand = hand_with(world, step.object)
+    reason = yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=15), *rest(hand)]
     return Outcome() if step.object not in world.held else Outcome(reason or "not_true_after", "the hand did not open")
 
 
@@ -266,22 +180,22 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
 
     def place(world: PlannedWorld, step: Step) -> Primitive:
         name, where = step.arguments
-        hand = _hand_with(world, name)
+        hand = hand_with(world, name)
         reason, detail = "no_base", ""
         for attempt in range(ATTEMPTS):
             found = _plan_place(world, predicate, name, where, hand)
             if found is None and (shut := _shut_joints(world, predicate, where, attempt)):
-                yield from _move_joint(world, shut[attempt % len(shut)], _free_hand(world), True)
+                yield from _move_joint(world, shut[attempt % len(shut)], free_hand(world), True)
                 continue
             if found is None:
                 return Outcome("no_base", f"no spot from which {predicate}({name}, {where}) would be true is in reach")
             stance, pos, turn = found
-            if reason := (yield from _go(world, stance)):
+            if reason := (yield from go(world, stance)):
                 continue
             if name not in world.held:
                 return Outcome("slipped", f"the hand lost {name}", attempts=attempt + 1)
             here, yaw = world.base
-            fingers, _ = _directions(Stance((float(here[0]), float(here[1])), yaw), "down")
+            fingers, _ = directions(Stance((float(here[0]), float(here[1])), yaw), "down")
             target, quat = world.grip_for(hand, name, pos, turn)
             target = target + LET_GO * -DOWN
             spheres = world.spheres(fingers, holding=name, hand=hand)
@@ -289,15 +203,15 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             if way is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
-            keeps, turned = world.index(name), _quat(quat)
+            keeps, turned = world.index(name), quaternion(quat)
             program = [
-                *_travel(world, hand, way, turned, keeps=keeps),
-                Phase(hand=hand, pos=_tuple(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1,
+                *travel(world, hand, way, turned, keeps=keeps),
+                Phase(hand=hand, pos=vector3(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1,
                       limit=20, after="", speed=0.03),
                 Phase(hand=hand, close=False, until=Until.EMPTY, limit=10),
-                Phase(hand=hand, pos=_tuple(target + RETREAT * -DOWN), tolerance=0.04, limit=15, after=""),
-                *_travel(world, hand, way[-2::-1], None),
-                *_rest(hand),
+                Phase(hand=hand, pos=vector3(target + RETREAT * -DOWN), tolerance=0.04, limit=15, after=""),
+                *travel(world, hand, way[-2::-1], None),
+                *rest(hand),
                 Phase(until=Until.WAITED, limit=6),
             ]  # fmt: skip
             reason = yield program
@@ -335,7 +249,7 @@ def _plan_place(
             twist = (turn - (stance.yaw - now) + np.pi) % (2 * np.pi) - np.pi
             if abs(twist) > np.pi / 3:  # the hand would be turned too far against the body
                 continue
-            ahead, _ = _directions(stance, "down")
+            ahead, _ = directions(stance, "down")
             spheres = world.spheres(ahead, holding=name, hand=hand, turn=turn)
             way = hand_way(obstacles, spheres, world.carried(hand, stance), target + LET_GO * -DOWN, spare=0.03)
             if way is not None:
@@ -362,7 +276,7 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             if not joints:
                 return Outcome("no_grasp", f"{name} has no joints that open")
             joint = joints[attempt % len(joints)]
-            hand = _free_hand(world, attempt // len(joints))
+            hand = free_hand(world, attempt // len(joints))
             reason, detail = yield from _move_joint(world, joint, hand, value)
         if world.facts.holds("open", name) == value:
             return Outcome(attempts=2 * ATTEMPTS)
@@ -378,13 +292,13 @@ def _move_joint(
     found = _plan_joint(world, joint, hand, value)
     if found is None:
         return "no_base", f"no free floor from which a hand can move {joint.name}"
-    if reason := (yield from _go(world, found.stance)):
+    if reason := (yield from go(world, found.stance)):
         return reason, f"no way leads to where a hand can move {joint.name}"
     program = _joint_program(world, joint, hand, found.places, found.pulls)
     if program is None:
         return "no_path", f"the hand has no way to {joint.name}"
     reason = yield program
-    yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=6, after=""), *_rest(hand)]
+    yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=6, after=""), *rest(hand)]
     return reason or "not_true_after", f"{joint.name} did not move far enough"
 
 
@@ -441,27 +355,27 @@ def _joint_program(
         way = hand_way(world.obstacles(), world.spheres(fingers, -normal)[:5], world.grip(hand), before)
     if way is None:
         return None
-    program = _travel(world, hand, way, quat)
+    program = travel(world, hand, way, quat)
     index = joint.object_index
     if not pulls:  # an open hand pushes it shut
         program += [
-            Phase(hand=hand, pos=_tuple(p - PRESS * n), close=False, tolerance=0.03, limit=12, after="", speed=0.04)
+            Phase(hand=hand, pos=vector3(p - PRESS * n), close=False, tolerance=0.03, limit=12, after="", speed=0.04)
             for p, n in places
         ]
-        last = _tuple(places[-1][0] - 2 * PRESS * places[-1][1])
+        last = vector3(places[-1][0] - 2 * PRESS * places[-1][1])
         program.append(Phase(hand=hand, pos=last, until=Until.WAITED, limit=6))
     else:
         program += [
-            Phase(hand=hand, pos=_tuple(first - PUSH_IN * normal), quat=quat, until=Until.TOUCHED, object=index,
+            Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), quat=quat, until=Until.TOUCHED, object=index,
                   close=False, limit=20, after="", speed=0.03),
-            Phase(hand=hand, pos=_tuple(first - PUSH_IN * normal), until=Until.HELD, object=index, close=True, limit=15,
-                  after="no_grasp", speed=0.02),
-            *[Phase(hand=hand, pos=_tuple(p), close=True, tolerance=0.05, limit=20, after="", keeps=index, speed=0.04)
+            Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), until=Until.HELD, object=index, close=True,
+                  limit=15, after="no_grasp", speed=0.02),
+            *[Phase(hand=hand, pos=vector3(p), close=True, tolerance=0.05, limit=20, after="", keeps=index, speed=0.04)
               for p, _ in places[1:]],
             Phase(hand=hand, close=False, until=Until.EMPTY, limit=10, after=""),
         ]  # fmt: skip
-    program.append(Phase(hand=hand, pos=_tuple(places[-1][0] + RETREAT * places[-1][1]), limit=12, after=""))
-    return [*program, *_rest(hand), Phase(until=Until.WAITED, limit=4)]
+    program.append(Phase(hand=hand, pos=vector3(places[-1][0] + RETREAT * places[-1][1]), limit=12, after=""))
+    return [*program, *rest(hand), Phase(until=Until.WAITED, limit=4)]
 
 
 PUSH_IN, PRESS = 0.03, 0.004
@@ -490,28 +404,33 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             if world.facts.holds("toggled_on", name) == value:
                 return Outcome(attempts=max(attempt, 1))
             button = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
-            hand = _free_hand(world, attempt)
+            hand = free_hand(world, attempt)
             found = _plan_touch(world, button, hand, attempt)
             if found is None:
                 reason, detail = "no_base", f"no free floor from which a hand reaches the button of {name}"
                 continue
             stance, aim = found
-            if reason := (yield from _go(world, stance)):
+            if reason := (yield from go(world, stance)):
                 continue
             _, yaw = world.base
-            fingers, palm = _directions(Stance(stance.xy, yaw), "down")
+            fingers, palm = directions(Stance(stance.xy, yaw), "down")
             quat = world.body.turned(hand, fingers, palm)
             way = hand_way(world.obstacles(), world.spheres(fingers), world.grip(hand), aim)
             if way is None:
                 reason, detail = "no_path", f"the hand has no way to the button of {name}"
                 continue
             reason = yield [
-                *_travel(world, hand, way, quat),
+                *travel(world, hand, way, quat),
                 Phase(
-                    hand=hand, pos=_tuple(button - fingers * FINGER), quat=quat, until=Until.WAITED, limit=5, speed=0.03
+                    hand=hand,
+                    pos=vector3(button - fingers * FINGER),
+                    quat=quat,
+                    until=Until.WAITED,
+                    limit=5,
+                    speed=0.03,
                 ),
-                *_travel(world, hand, way[::-1], None),
-                *_rest(hand),
+                *travel(world, hand, way[::-1], None),
+                *rest(hand),
             ]
             detail = f"the fingers were not at the button of {name} for long enough"
         if world.facts.holds("toggled_on", name) == value:
@@ -530,7 +449,7 @@ def _plan_touch(world: PlannedWorld, point: Vector, hand: int, attempt: int) -> 
     obstacles, floor = world.obstacles(), world.floor()
     found = 0
     for stance in world.stances(hand, point, floor, AWAY, most=12):
-        fingers, _ = _directions(stance, "down")
+        fingers, _ = directions(stance, "down")
         for offset in (-fingers * (NEAR_BUTTON + FINGER), -DOWN * NEAR_BUTTON - fingers * FINGER):
             aim = point + offset
             if hand_way(obstacles, world.spheres(fingers), world.resting(hand, stance), aim) is not None:
@@ -538,250 +457,6 @@ def _plan_touch(world: PlannedWorld, point: Vector, hand: int, attempt: int) -> 
                 if found > attempt:
                     return stance, aim
     return None
-
-
-# Water, dirt, heat and cold.
-
-
-def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
-    """The primitive that takes dust or stains off an object with a tool that a hand holds."""
-
-    def clean(world: PlannedWorld, step: Step) -> Primitive:
-        name, tool = step.arguments
-        hand = _hand_with(world, tool)
-        if predicate == "stained" and not world.facts.holds("soaked", tool):
-            return Outcome("no_grasp", f"{tool} is not soaked")
-        reason, detail, passed = "no_base", f"no dirt of {name} is in reach", set[int]()
-        for attempt in range(WIPES):
-            if not world.facts.holds(predicate, name):
-                return Outcome(attempts=attempt + 1)
-            if tool not in world.held:
-                return Outcome("slipped", f"the hand lost {tool}", attempts=attempt + 1)
-            spots = [spot for spot in world.dirt(predicate, name) if spot.number not in passed]
-            found = _plan_wipe(world, spots, tool, hand)
-            if found is None:
-                break
-            stance, chosen = found
-            if reason := (yield from _go(world, stance)):
-                passed |= {spot.number for spot in chosen}
-                continue
-            program = _wipe_program(world, chosen, tool, hand)
-            passed |= {spot.number for spot in chosen}
-            if program:
-                reason = yield program
-                detail = f"the tool did not take enough off {name}"
-        yield [_carry(world, hand)]
-        if not world.facts.holds(predicate, name):
-            return Outcome(attempts=WIPES)
-        return Outcome(reason or "not_true_after", detail, attempts=WIPES)
-
-    return clean
-
-
-WIPES, AT_ONCE, PRESSED, LIFTED, TOP = 8, 8, 0.02, 0.06, -0.3
-"""Rounds of wiping; particles of a round; m that a tool is pressed into a face, and lifted off it between particles;
-smallest z of the normal of a face that is wiped."""
-
-
-def _tool_box(world: PlannedWorld, tool: str, hand: int) -> tuple[Vector, Vector]:
-    """Middle of a held tool's box relative to the hand's grasp point, and its half size, m."""
-    corners = world.vertices(tool)
-    low, high = corners.min(0), corners.max(0)
-    return (low + high) / 2 - world.grip(hand), (high - low) / 2
-
-
-def _plan_wipe(
-    world: PlannedWorld, spots: Sequence[DirtSpot], tool: str, hand: int
-) -> tuple[Stance, list[DirtSpot]] | None:
-    """A stance from which particles are in reach, and these, the nearest first."""
-    offset, half = _tool_box(world, tool, hand)
-    floor = world.floor()
-    best: tuple[Stance, list[DirtSpot]] | None = None
-    for spot in [s for s in spots if s.normal[2] > TOP][:6]:
-        for stance in world.stances(hand, spot.pos, floor, AWAY, most=3):
-            here = np.array(stance.xy)
-            near = [
-                s
-                for s in spots
-                if s.normal[2] > TOP
-                and world.reaches(hand, stance, _at_spot(s, offset, half))
-                and (s.normal[2] > 0.5 or (here - s.pos[:2]) @ s.normal[:2] > 0)
-            ]
-            if near and (best is None or len(near) > len(best[1])):
-                best = stance, near
-    if best is None:
-        return None
-    stance, near = best
-    return stance, sorted(near, key=lambda s: float(np.linalg.norm(s.pos - spots[0].pos)))[:AT_ONCE]
-
-
-def _at_spot(spot: DirtSpot, offset: Vector, half: Vector) -> Vector:
-    """Grasp point of a hand whose tool presses on a particle."""
-    depth = float(np.abs(spot.normal) @ half)
-    return spot.pos + spot.normal * (depth - PRESSED) - offset
-
-
-def _wipe_program(world: PlannedWorld, spots: Sequence[DirtSpot], tool: str, hand: int) -> Program:
-    offset, half = _tool_box(world, tool, hand)
-    _, yaw = world.base
-    fingers = np.array([np.cos(yaw), np.sin(yaw), 0.0])
-    obstacles, spheres = world.obstacles([tool]), world.spheres(fingers)
-    keeps, at, program = world.index(tool), world.grip(hand), Program()
-    for spot in spots:
-        target = _at_spot(spot, offset, half)
-        before = target + LIFTED * spot.normal
-        way = hand_way(obstacles, spheres, at, before)
-        if way is None:
-            continue
-        program += _travel(world, hand, way, None, keeps=keeps)
-        program += [
-            Phase(hand=hand, pos=_tuple(target), keeps=keeps, tolerance=0.004, limit=6, after="", speed=0.04),
-            Phase(hand=hand, pos=_tuple(before), keeps=keeps, tolerance=0.03, limit=12, after=""),
-        ]
-        at = before
-    return [*program, _carry(world, hand, keeps)] if program else program
-
-
-def _wait(
-    world: PlannedWorld, predicate: str, name: str, seconds: float, keeps: int = -1
-) -> Generator[Program, str, str]:
-    """Stands still until a predicate holds; returns the reason why it does not."""
-    for _ in range(int(np.ceil(seconds / WAIT))):
-        if world.facts.holds(predicate, name):
-            return ""
-        if reason := (yield [Phase(until=Until.WAITED, keeps=keeps, limit=int(10 * WAIT))]):
-            return reason
-    return "" if world.facts.holds(predicate, name) else "not_true_after"
-
-
-WAIT, SOAKING, COOKING, FREEZING = 1.0, 20.0, 90.0, 200.0
-"""s between looks at a predicate; s that a tap, a source of heat and one of cold are given."""
-
-
-def _hold_at(
-    world: PlannedWorld, name: str, hand: int, points: Sequence[Vector], link: int = -1
-) -> Generator[Program, str, tuple[str, list[Vector]]]:
-    """Brings a held object's centre of mass, or an annotated link of it, to the first of some points that the hand has
-    a way to, with the robot standing anywhere; returns the reason why it did not, and the way."""
-
-    def part() -> Vector:
-        return world.com(name) if link < 0 else np.asarray(world.view.link_pos)[world.world, link].astype(float)
-
-    for point in points:
-        obstacles, floor = world.obstacles([name]), world.floor()
-        for stance in world.stances(hand, point - part() + world.grip(hand), floor, AWAY):
-            ahead, _ = _directions(stance, "down")
-            _, now = world.base
-            c, s = np.cos(stance.yaw - now), np.sin(stance.yaw - now)
-            target = point + np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (world.grip(hand) - part())
-            if not world.reaches(hand, stance, target):
-                continue
-            spheres = world.spheres(ahead, holding=name, hand=hand, turn=stance.yaw - now)
-            if hand_way(obstacles, spheres, world.carried(hand, stance), target) is None:
-                continue
-            if reason := (yield from _go(world, stance)):
-                continue
-            target = point - part() + world.grip(hand)
-            ahead, _ = _directions(Stance(stance.xy, world.base[1]), "down")
-            spheres = world.spheres(ahead, holding=name, hand=hand)
-            way = hand_way(world.obstacles([name]), spheres, world.grip(hand), target)
-            if way is None:
-                continue
-            reason = yield _travel(world, hand, way, None, keeps=world.index(name))
-            return reason, way
-    return "no_path", []
-
-
-def soak(world: PlannedWorld, step: Step) -> Primitive:
-    """Holds the object below the tap."""
-    name, tap = step.arguments
-    hand = _hand_with(world, name)
-    tables = world.domain.model.tables
-    links = np.flatnonzero((tables.link_object == world.index(tap)) & (tables.link_kind == LinkKind.WATER_SOURCE))
-    source = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
-    half = float(np.ptp(world.vertices(name)[:, 2])) / 2
-    here, _ = world.base
-    back = np.array([*(here - source[:2]), 0.0])
-    back /= max(float(np.linalg.norm(back)), 1e-6)
-    points = [source - np.array([0, 0, below + half]) + ahead * back for ahead in (0.0, 0.05) for below in BELOW_TAP]
-    reason, way = yield from _hold_at(world, name, hand, points)
-    if reason:
-        return Outcome(reason, f"the hand has no way with {name} below {tap}")
-    reason = yield from _wait(world, "soaked", name, SOAKING, world.index(name))
-    yield [*_travel(world, hand, way[-2::-1], None), _carry(world, hand)]
-    return Outcome(reason, f"{name} did not take enough water" if reason else "")
-
-
-BELOW_TAP = (0.16, 0.12, 0.2)
-"""m below a source of water at which the top of what is soaked is held, so that the hand passes below the spout."""
-
-
-def cook(world: PlannedWorld, step: Step) -> Primitive:
-    """Holds the object near a source that acts by nearness, or waits while it is inside one, until it is cooked."""
-    name, source = step.arguments
-    rules = next(s for s in world.domain.sources if s.name == source)
-    if world.facts.holds("cooked", name):
-        return Outcome()
-    way: list[Vector] = []
-    hand = -1
-    if not rules.acts_inside:
-        hand = _hand_with(world, name)
-        tables = world.domain.model.tables
-        links = np.flatnonzero((tables.link_object == world.index(source)) & (tables.link_kind == LinkKind.HEAT_SOURCE))
-        link = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
-        half = float(np.ptp(world.vertices(name)[:, 2])) / 2
-        points = [link - (above + half) * DOWN for above in (0.06, 0.1, 0.14)]
-        reason, way = yield from _hold_at(world, name, hand, points)
-        if reason:
-            return Outcome(reason, f"the hand has no way with {name} over {source}")
-    keeps = world.index(name) if hand >= 0 else -1
-    reason = yield from _wait(world, "cooked", name, COOKING, keeps)
-    if hand >= 0:
-        yield [*_travel(world, hand, way[-2::-1], None), _carry(world, hand)]
-    return Outcome(reason, f"{name} did not get hot enough" if reason else "")
-
-
-def freeze(world: PlannedWorld, step: Step) -> Primitive:
-    """Waits until the object is frozen."""
-    name, source = step.arguments
-    if not world.facts.holds("inside", name, source):
-        return Outcome("not_true_after", f"{name} is not inside {source}")
-    reason = yield from _wait(world, "frozen", name, FREEZING)
-    return Outcome(reason, f"{name} did not get cold enough" if reason else "")
-
-
-def slice_(world: PlannedWorld, step: Step) -> Primitive:
-    """Presses the knife's blade onto the object from above."""
-    name, knife = step.arguments
-    hand = _hand_with(world, knife)
-    tables = world.domain.model.tables
-    links = np.flatnonzero((tables.link_object == world.index(knife)) & (tables.link_kind == LinkKind.SLICER))
-    reason, detail = "no_path", f"the hand has no way with {knife} to {name}"
-    for attempt in range(ATTEMPTS):
-        if world.facts.holds("sliced", name):
-            return Outcome(attempts=max(attempt, 1))
-        if knife not in world.held:
-            return Outcome("slipped", f"the hand lost {knife}", attempts=attempt)
-        top = np.array([*world.com(name)[:2], world.vertices(name)[:, 2].max()])
-        reason, way = yield from _hold_at(world, knife, hand, [top + CUT_ABOVE * -DOWN], int(links[0]))
-        if reason:
-            continue
-        blade = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
-        pressed = _tuple(top + CUT_DEPTH * DOWN - blade + world.grip(hand))
-        keeps = world.index(knife)
-        reason = yield [
-            Phase(hand=hand, pos=pressed, keeps=keeps, tolerance=0.01, limit=25, after="", speed=0.04),
-            *_travel(world, hand, way[::-1], None),
-        ]
-        detail = f"the blade did not press hard enough on {name}"
-    yield [_carry(world, hand)]
-    if world.facts.holds("sliced", name):
-        return Outcome(attempts=ATTEMPTS)
-    return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
-
-
-CUT_ABOVE, CUT_DEPTH = 0.08, 0.04
-"""m above what is cut at which the blade comes to it, and below its top that it goes for."""
 
 
 ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {

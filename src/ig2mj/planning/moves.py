@@ -1,0 +1,124 @@
+"""What primitives in physics have in common: driving to a stance, phases of a hand, and which hand it is.
+
+A primitive is a generator: it yields motion programs (`list[Phase]`), is sent the reason why each failed ("" for
+success), and returns its outcome.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Generator, Sequence
+
+import numpy as np
+
+from ig2mj.planning.phases import Base, Phase, Until
+from ig2mj.planning.steps import Outcome
+from ig2mj.planning.world import PlannedWorld, Stance, Vector
+
+Program = list[Phase]
+Primitive = Generator[Program, str, Outcome]
+
+ATTEMPTS = 4
+"""Tries of a primitive."""
+
+ABOVE, BELOW = 0.12, 0.03
+"""m: above a grasp at which a hand comes to it, and below an object's top that it goes for, until it touches."""
+
+LET_GO = 0.015
+"""m above its place at which an object is let go."""
+
+AWAY = 0.55
+"""m that a base would like to be from what its hand does."""
+
+RETREAT = 0.12
+"""m that a hand goes back after it has let go."""
+
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@dataclasses.dataclass(frozen=True)
+class PrimitiveFailed(Exception):
+    """A primitive cannot go on."""
+
+    reason: str
+    detail: str
+
+
+# Moving the base.
+
+
+def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
+    """Drives to a stance; returns the reason why it did not get there."""
+    here, yaw = world.base
+    apart = float(np.linalg.norm(here - stance.xy))
+    turned = abs((yaw - stance.yaw + np.pi) % (2 * np.pi) - np.pi)
+    if apart < 0.04 and turned < 0.1:
+        return ""
+    plan = world.floor().way(here, stance.xy)
+    if plan is None:
+        return "no_path"
+    return (yield drive(plan, stance.yaw))
+
+
+def drive(points: np.ndarray, yaw: float | None) -> Program:
+    """The program that follows a way, and at its end turns."""
+    program = [Phase(Base.DRIVE, xy=(float(x), float(y)), tolerance=0.08) for x, y in points[1:]]
+    if program:
+        program[-1] = dataclasses.replace(program[-1], tolerance=0.025)
+    if yaw is not None:
+        program.append(Phase(Base.TURN, yaw=float(yaw), turn_tolerance=0.06, limit=60))
+    return program
+
+
+# Hands.
+
+
+def directions(stance: Stance, kind: str) -> tuple[Vector, Vector]:
+    """Where fingers point and the palm faces, world frame: "down": onto something, "front": against a face."""
+    ahead = np.array([np.cos(stance.yaw), np.sin(stance.yaw), 0.0])
+    return (ahead, DOWN) if kind == "down" else (-DOWN, ahead)
+
+
+def travel(world: PlannedWorld, hand: int, points: Sequence[Vector], quat, keeps: int = -1) -> Program:
+    """Phases of a hand along points of a way."""
+    last = len(points) - 1
+    return [
+        Phase(
+            hand=hand, pos=vector3(p), quat=quat, keeps=keeps, tolerance=0.04 if k < last else 0.025, limit=60, after=""
+        )
+        for k, p in enumerate(points)
+    ]
+
+
+def carry(world: PlannedWorld, hand: int, keeps: int = -1, name: str = "") -> Phase:
+    return Phase(
+        hand=hand, pos=vector3(world.carry(hand, name)), in_body=True, keeps=keeps, tolerance=0.08, limit=40, after=""
+    )
+
+
+def rest(hand: int) -> Program:
+    """The open hand goes back to where it rests."""
+    return [Phase(hand=hand, reset=True, close=False, until=Until.WAITED, limit=4)]
+
+
+def free_hand(world: PlannedWorld, attempt: int = 0) -> int:
+    free = [h for h, name in enumerate(world.held) if not name]
+    if not free:
+        raise PrimitiveFailed("no_grasp", f"the hands are full: {', '.join(world.held)}")
+    return free[::-1][attempt % len(free)]
+
+
+def hand_with(world: PlannedWorld, name: str) -> int:
+    if name not in world.held:
+        raise PrimitiveFailed("no_grasp", f"no hand holds {name}")
+    return world.held.index(name)
+
+
+def vector3(v) -> tuple[float, float, float]:
+    x, y, z = (float(c) for c in v)
+    return (x, y, z)
+
+
+def quaternion(q) -> tuple[float, float, float, float]:
+    w, x, y, z = (float(c) for c in q)
+    return (w, x, y, z)
