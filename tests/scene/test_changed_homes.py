@@ -48,6 +48,14 @@ def test_what_lies_in_a_bowl_does_not_bear_the_bowl():
     assert ig2mj.load_scene("small_home", remove="apple_0").removed == ("apple_0",)
 
 
+@pytest.mark.slow
+def test_what_lies_on_a_removed_carpet_stays_and_lies_on_the_floor():
+    home, scene = ig2mj.load_scene("cedar"), ig2mj.load_scene("cedar", remove="carpet_2")
+    assert scene.removed == ("carpet_2",)
+    down = home.start_data().body("toy_1").xpos[2] - scene.start_data().body("toy_1").xpos[2]
+    assert 0.002 < down < 0.03 and drift(scene) < 0.005
+
+
 def test_all_else_starts_where_it_was():
     home, scene = (ig2mj.load_scene("small_home", remove=names) for names in ((), "mug_0"))
     before, after = home.start_data(), scene.start_data()

@@ -31,6 +31,9 @@ TOUCHING = 0.006
 FLOOR = 0.05
 """m: a fixed object whose lower edge is below stands on the floor, whatever it touches."""
 
+THIN = 0.03
+"""m: what stands on a removed object that is thinner, a carpet or a mat, stays and is put down on the floor."""
+
 _CHANGE = re.compile(r"(?P<kind>remove|replace):(?P<name>[^=]*)(?:=(?P<instead>.*))?")
 
 
@@ -99,7 +102,7 @@ class ChangedHome:
     Attributes:
       manifest: without it. removed: all names that are gone for good; those of replaced objects are not among them.
       planned: the replacements, as `add_objects` takes them. rooms: of each replacement.
-      dependents: loose objects that stood on a replaced one -> what they stood on, the lowest first.
+      dependents: loose objects that stood on a replaced one or a carpet -> what they stand on now, the lowest first.
       bottoms: height (m) of the lower edge of each dependent.
     """
 
@@ -133,17 +136,22 @@ def take_out(
     home = _AtStart(model, manifest)
     replaced = {c.name: find_model(c.instead) for c in changes if c.instead is not None}
     bearing = home.bearing()
-    gone = _above([c.name for c in changes if c.instead is None] + list(also), bearing)
+    removed = [c.name for c in changes if c.instead is None]
+    floor = next((o.name for o in entries.values() if o.category == "floors"), None)
+    thin = {name for name in removed if floor is not None and np.ptp(home.box(name)[:, 2]) < THIN}
+    gone = _above([name for name in removed if name not in thin] + list(also), bearing) | thin
     if left := sorted(gone & set(replaced)):
         raise Ig2mjError(f"'{left[0]}' is replaced, and what it stands on is removed: remove it, too, or keep that")
-    onto = _above(list(replaced), bearing) - set(replaced)
+    lowered = [*replaced, *sorted(thin)]
+    onto = _above(lowered, bearing) - set(lowered)
     fixed = {name for name in onto if entries[name].fixed}
     gone = (gone | fixed | _above(list(fixed), bearing)) - set(replaced)
     dependents = {
-        name: next(k for k, above in bearing.items() if name in above and (k in replaced or k in onto))
-        for name in _lowest_first(list(replaced), bearing)
+        name: next(k for k, above in bearing.items() if name in above and (k in lowered or k in onto))
+        for name in _lowest_first(lowered, bearing)
         if name in onto - gone
     }
+    dependents = {name: str(floor) if under in thin else under for name, under in dependents.items()}
     planned = [(home.replacement(entries[name], new), new) for name, new in replaced.items()]
     names = gone | set(replaced)
     names |= {part.object for name in names for part in entries[name].parts}

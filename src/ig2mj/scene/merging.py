@@ -69,7 +69,8 @@ def merged_home(file: pathlib.Path, manifest: Manifest, changes: Sequence[Change
             msgspec.structs.replace(o, rooms=changed.rooms[o.name]) if o.name in changed.rooms else o
             for o in merged.objects
         ]
-        lost = _put_down(root, _compiled(root, file), merged, changed) if changed.planned else set()
+        moves = changed.planned or changed.dependents
+        lost = _put_down(root, _compiled(root, file), merged, changed) if moves else set()
         if not lost:
             break
         also |= lost
@@ -97,7 +98,7 @@ def _put_down(root: ElementTree.Element, model: mujoco.MjModel, manifest: Manife
     replaced = [addition.name for addition, _ in changed.planned]
     lifts: dict[str, float] = {}
     for name, under in changed.dependents.items():
-        if under in replaced:
+        if under not in changed.dependents:
             body = model.body(entries[name].bodies[0]).id
             top = _surface(model, data, entries[under].bodies, data.subtree_com[body][:2], changed.bottoms[name])
             if top is None:
