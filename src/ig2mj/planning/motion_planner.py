@@ -78,9 +78,14 @@ class FreeFloor:
         best = int(np.argmin(apart))
         return cells[best] if apart[best] <= within else None
 
-    def distances(self, xy: Point) -> Float[np.ndarray, "h w"]:
-        """m along the floor from each cell to a point, with the surcharge of narrow places; infinite without a way."""
-        return self._field(xy)[0]
+    def distances(self, xy: Point, within: float = NEAR_GOAL) -> Float[np.ndarray, "h w"]:
+        """m along the floor from each cell to the free one nearest to a point, with the surcharge of narrow places;
+        infinite without a way.
+
+        Args:
+          within: m from the point that the free cell is at most.
+        """
+        return self._field(xy, within)[0]
 
     def way(self, start: Point, goal: Point) -> Float[np.ndarray, "N 2"] | None:
         """Points of a way between two positions, straightened; None where there is none."""
@@ -95,7 +100,7 @@ class FreeFloor:
             cells.append(np.array(divmod(int(after), width)))
         return np.concatenate([np.asarray(start, float)[None], self.occupancy.middles(self._straightened(cells))])
 
-    def _field(self, goal: Point) -> tuple[Float[np.ndarray, "h w"], Int[np.ndarray, "h w"]]:
+    def _field(self, goal: Point, within: float = NEAR_GOAL) -> tuple[Float[np.ndarray, "h w"], Int[np.ndarray, "h w"]]:
         """Distance of every cell to a goal, and the next cell of the way (row times width and column; -1: none)."""
         from scipy.sparse import csgraph
 
@@ -103,7 +108,7 @@ class FreeFloor:
         places = np.flatnonzero(self.free.ravel())
         number.ravel()[places] = np.arange(len(places))
         distance, following = np.full(self.free.shape, np.inf), np.full(self.free.shape, -1)
-        end = self.nearest(goal, NEAR_GOAL)
+        end = self.nearest(goal, within)
         if end is None:
             return distance, following
         graph = FloorMap(self.free, self.occupancy.origin, RESOLUTION).graph(number).tocoo()

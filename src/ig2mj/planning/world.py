@@ -15,7 +15,7 @@ from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.footprint import BaseFootprint
-from ig2mj.planning.motion_planner import FreeFloor, MotionPlanner
+from ig2mj.planning.motion_planner import NEAR_START, FreeFloor, MotionPlanner
 from ig2mj.planning.stage import Stage
 from ig2mj.predicates.literals import object_index, room_index
 from ig2mj.sampling.placement import Placer
@@ -227,7 +227,7 @@ class PlannedWorld:
         middles = floor.occupancy.middles(cells)
         apart = np.linalg.norm(middles - point[:2], axis=1)
         near = np.flatnonzero(apart < self.body.reach)
-        field = floor.distances(here)
+        field = floor.distances(here, NEAR_START)
         way = field[tuple(cells[near].T)]
         cost = 0.6 * way + 2.0 * np.abs(apart[near] - away) - 0.5 * np.minimum(floor.spare[tuple(cells[near].T)], 0.2)
         order = near[np.argsort(cost)]
