@@ -37,10 +37,10 @@ DISTANCE, MOST_DRIVE_SECONDS = 1.0, 20.0
 CUBE_MASS, LIFT, TRIES = 0.2, 0.08, 10
 """kg; m by which the cube must have risen when the hand rests; number of tries."""
 
-CUBES = (0.02, 0.03, 0.04, 0.05)
+CUBES = (0.02, 0.03, 0.04)
 """m: edges. A gripper gets the largest that is at most `SHARE` of its opening."""
 
-SHARE = 0.65
+SHARE = 0.5
 
 POST = 0.06
 """m: edge of the post."""
@@ -303,6 +303,8 @@ def hand_of(robot: UrdfRobot) -> Hand:
     across = two - one
     opening = float(np.linalg.norm(across))
     across = across / max(opening, 1e-9)
+    if ray.palm not in ray.end_bodies:  # else a finger hangs on what it closes against
+        opening = body.gap({*ray.start_bodies}, {*ray.end_bodies}, robot.name, open_data)
     if suction:
         approach = across
         across = np.cross(approach, np.eye(3)[int(np.argmin(np.abs(approach)))])
@@ -331,15 +333,18 @@ def _lift(
         raise EngineError(f"the fingers of robot '{robot.name}' open by {1000 * hand.opening:.0f} mm only")
     edge = result.cube = fits[-1]
     bare = Arm(load_scene(home, agents=[robot]), robot, hand)
-    tried = ((*place, _grasp(bare, *place[1:])) for place in _places(bare, rng, robot))
-    chosen = next((place for place in tried if place[-1] is not None), None)
-    if chosen is None:
+    for name, point, approach, postures in _places(bare, rng, robot):
+        found = _grasp(bare, point, approach, postures)
+        if found is None:
+            continue
+        height = round(float(point[2]) - edge / 2, 3)
+        cube, post = prop(edge, edge), prop(POST if name == "from above" else edge, height)
+        objects = [f"{post}@fixed:{point[0]:.4f},{point[1]:.4f},{height / 2:.4f},0", str(cube)]
+        if not _in_the_way(Arm(load_scene(home, agents=[robot], objects=objects), robot, hand), *found):
+            result.approach = name
+            break
+    else:
         raise EngineError(f"robot '{robot.name}' reaches no place where a cube could lie before it")
-    name, point, approach, _, found = chosen
-    assert found is not None
-    result.approach, height = name, round(float(point[2]) - edge / 2, 3)
-    cube, post = prop(edge, edge), prop(POST if name == "from above" else edge, height)
-    objects = [f"{post}@fixed:{point[0]:.4f},{point[1]:.4f},{height / 2:.4f},0", str(cube)]
     q, hover = found
     start = {**robot.layout.start, **dict(zip(hand.joints, map(float, hover), strict=True))}
     ready = dataclasses.replace(robot, layout=dataclasses.replace(robot.layout, start=start))
@@ -385,6 +390,15 @@ def _grasp(
     return None
 
 
+def _in_the_way(arm: Arm, grasp: np.ndarray, hover: np.ndarray) -> bool:
+    """The post touches the robot before the cube, at it, or between."""
+    for share in (0.0, 0.5, 1.0):
+        arm.put(grasp + share * (hover - grasp))
+        if arm.collides():
+            return True
+    return False
+
+
 def _places(
     arm: Arm, rng: np.random.Generator, robot: UrdfRobot
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray, list[np.ndarray]]]:
@@ -403,7 +417,8 @@ def _places(
             reach = float(np.linalg.norm(away))
             wanted = outward * away / max(reach, 1e-9) + np.array([0, 0, upward])
             level = HEIGHTS[0] < at[2] < HEIGHTS[1] and abs(side[2]) < 0.5
-            if level and along @ wanted > ALIGNED and away @ ahead > 0.3 * reach and reach > 0.12:
+            free = not robot.drives or away @ ahead > 0.3 * reach  # a wheel is no place for a post
+            if level and free and along @ wanted > ALIGNED and reach > 0.12:
                 good.append((q, at, wanted))
         if len(good) < FEWEST:
             continue

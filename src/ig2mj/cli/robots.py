@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 
 from ig2mj.cli.common.own_robot import NONE, Own, own_robot
+from ig2mj.cli.robots_table import table
 
 
 def show(
@@ -81,4 +82,4 @@ def try_(
     return 0 if result.passed else 1
 
 
-SUBCOMMANDS = {"show": show, "try": try_}
+SUBCOMMANDS = {"show": show, "try": try_, "table": table}

@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
@@ -54,6 +55,9 @@ TOUCHES = 0.02
 
 PARALLEL = 0.95
 """Cosine of the angle between wheels of one direction."""
+
+CLEAR, POSTURES = 0.05, 300
+"""m above the floor of an arm at the start, and postures tried, where its file says nothing of it."""
 
 SHORT_BRANCH, ARM_BEFORE = 4, 3
 """Most joints in a row of a finger, and fewest between base and hand, where names say nothing."""
@@ -333,6 +337,39 @@ def _start(robot: Description, body: RobotBody) -> dict[str, float]:
         low, high = body.limits(name)
         found[name] = float(np.clip(value, low, high))
     return found
+
+
+def raised(body: RobotBody, layout: Layout) -> Layout:
+    """The layout, where nothing is said of the start and the arm would begin in the floor, with a start above it.
+
+    Of postures at random, always the same, the one nearest to the middle of the joints' limits whose links are all
+    `CLEAR` above what the robot stands on.
+    """
+    if layout.start or not layout.arm or _clearance(body, layout, {}) > 0:
+        return layout
+    rng, limits = np.random.default_rng(0), {name: body.limits(name) for name in layout.arm}
+    spans = {n: (max(low, -np.pi), min(high, np.pi)) for n, (low, high) in limits.items()}
+    best: tuple[float, dict[str, float]] | None = None
+    for _ in range(POSTURES):
+        shares = rng.uniform(-0.8, 0.8, len(spans))
+        start = {n: (a + b) / 2 + s * (b - a) / 2 for s, (n, (a, b)) in zip(shares, spans.items(), strict=True)}
+        off = float(np.sum(shares**2))
+        if (best is None or off < best[0]) and _clearance(body, layout, start) > CLEAR:
+            best = off, {name: round(float(value), 3) for name, value in start.items()}
+    return layout if best is None else dataclasses.replace(layout, start=best[1])
+
+
+def _clearance(body: RobotBody, layout: Layout, start: Mapping[str, float]) -> float:
+    """m: height of the lowest point of what the arm moves above what the robot stands on."""
+    posed = dataclasses.replace(layout, start=start)
+    data = body.posed({name: body.start_of(name, posed) for name in (*layout.arm, *layout.gripper)})
+    floor = -body.standing(layout)
+    lows = []
+    for link in body.moved_by(layout.arm):
+        points, (pos, turn) = body.points(link), body.pose(link, data)
+        if len(points):
+            lows.append(float((pos[2] + points @ turn[2]).min()))
+    return min(lows, default=np.inf) - floor
 
 
 def _link(given: Mapping[str, Any], name: str, found: str | None) -> str | None:

@@ -191,6 +191,11 @@ class RobotBody:
             return -min(lows, default=-self.height)
         return max(-min(lows, default=0.0), 0.0)
 
+    def moved_by(self, joints: Collection[str]) -> list[str]:
+        """Links that any of these joints moves."""
+        wanted = set(joints)
+        return [link for link in self._links() if self.joints_to({link}) & wanted]
+
     def joints_to(self, links: Collection[str]) -> set[str]:
         """Joints between the base and these links."""
         above, found = {j.child: j for j in self._description.joints}, set()
@@ -341,6 +346,18 @@ class RobotBody:
                 corners = SIGNS * model.geom_aabb[geom, 3:] + model.geom_aabb[geom, :3]
             found.append(model.geom_pos[geom] + corners @ turn.reshape(3, 3).T)
         return np.concatenate(found)
+
+    def gap(self, some: Collection[str], others: Collection[str], agent: str, data: Any) -> float:
+        """m between the nearest points of two groups of links, by their bodies' names in a scene. data: of `posed`."""
+        model, fromto = self._model, np.zeros(6)
+
+        def geoms(names: Collection[str]) -> list[int]:
+            links = {self.base if name == agent else name.removeprefix(f"{agent}_") for name in names}
+            bodies = {model.body(self._own(link)).id for link in links}
+            return [g for g in range(model.ngeom) if model.geom_bodyid[g] in bodies and model.geom_contype[g] > 0]
+
+        pairs = [(one, two) for one in geoms(some) for two in geoms(others)]
+        return min((mujoco.mj_geomDistance(model, data, *pair, 0.5, fromto) for pair in pairs), default=0.0)
 
     def chain(self, layout: Layout, hand: str) -> Chain | None:
         """The arm's joints from the base to a hand, frames parallel at joint positions 0; None where there are none."""

@@ -37,7 +37,7 @@ from ig2mj.agents.parts import (
     visual,
 )
 from ig2mj.agents.task_robot import TaskRobot
-from ig2mj.agents.urdf.assignment import find_layout
+from ig2mj.agents.urdf.assignment import find_layout, raised
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.controller import UrdfController
 from ig2mj.agents.urdf.description import Description
@@ -140,7 +140,8 @@ class UrdfRobot(TaskRobot):
         body = RobotBody(path, description)
         found = find_layout(description, body, given, where)
         body.check(found)
-        return cls(path, name or description.name, description, with_closed_limits(body, found), compiled=body)
+        whole = raised(body, with_closed_limits(body, found))
+        return cls(path, name or description.name, description, whole, compiled=body)
 
     @functools.cached_property
     def body(self) -> RobotBody:
