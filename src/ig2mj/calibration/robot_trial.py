@@ -37,10 +37,13 @@ DISTANCE, MOST_DRIVE_SECONDS = 1.0, 20.0
 CUBE_MASS, LIFT, TRIES = 0.2, 0.08, 10
 """kg; m by which the cube must have risen when the hand rests; number of tries."""
 
+RAISE = np.array([0.0, 0.0, 0.15])
+"""m: by which the hand goes up."""
+
 CUBES = (0.02, 0.03, 0.04)
 """m: edges. A gripper gets the largest that is at most `SHARE` of its opening."""
 
-SHARE = 0.5
+SHARE = 0.51
 
 POST = 0.06
 """m: edge of the post."""
@@ -50,6 +53,9 @@ SPREAD, TURN = 0.012, math.radians(12)
 
 HOVER = 0.10
 """m between the gripper and the cube before it approaches."""
+
+MOST_BEND = 1.0
+"""rad or m: by which a joint moves between the cube and `HOVER` before it."""
 
 SAMPLES = 4000
 """Postures of the arm among which the post's place is chosen."""
@@ -63,7 +69,7 @@ APPROACHES = {"from above": (0.0, -1.0), "obliquely": (math.sqrt(0.5), -math.sqr
 ALIGNED = math.cos(math.radians(45))
 """Cosine to an approach of postures that count for it."""
 
-FEWEST, PLACES, NEAREST = 3, 4, 20
+FEWEST, PLACES, NEAREST = 3, 12, 30
 """Postures with which an approach is tried; places tried for each; postures tried at each place."""
 
 PropMaker = Callable[[float, float], pathlib.Path]
@@ -248,7 +254,7 @@ class Arm:
         return self._low + span * (0.03 + 0.94 * rng.random(len(span)))
 
     def solve(
-        self, q: np.ndarray, point: np.ndarray, approach: np.ndarray, across: np.ndarray | None, steps: int = 200
+        self, q: np.ndarray, point: np.ndarray, approach: np.ndarray, across: np.ndarray | None, steps: int = 100
     ) -> tuple[np.ndarray, float, float]:
         """Posture near q that brings the hand there, and its errors: m and rad (of the approach)."""
         weight = 0.3
@@ -352,7 +358,7 @@ def _lift(
     simulation = Simulation(scene, grasping=mode)
     loose = scene.additions[-1].name
     arm = Arm(scene, ready, hand)
-    _, _, side = arm.put(q)
+    side = arm.put(q)[2].copy()
     yaw = math.atan2(side[1], side[0])
     for _ in range(tries):
         simulation.reset()
@@ -362,12 +368,13 @@ def _lift(
         simulation.set_object_pose(loose, spot, (math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2)))
         simulation.robots.act(count=3)
         low = float(simulation.object_pose(loose)[0][2])
-        grasp, _, _ = arm.solve(q, spot, approach, None)
-        before, _, _ = arm.solve(hover, spot - HOVER * approach, approach, None)
-        raised, _, _ = arm.solve(grasp, spot + np.array([0.0, 0.0, 0.15]), approach, None)
+        axis = _kept(side, q)
+        grasp, _, _ = arm.solve(q, spot, approach, axis)
+        before, _, _ = arm.solve(grasp, spot - HOVER * approach, approach, axis)
+        raised, _, _ = arm.solve(grasp, spot + RAISE, approach, axis)
         move = functools.partial(_move, simulation, hand)
         for stage, (posture, grip, settle) in enumerate(
-            ((before, 1.0, 2), (grasp, 1.0, 3), (grasp, -1.0, 8), (raised, -1.0, 8))
+            ((before, 1.0, 3), (grasp, 1.0, 5), (grasp, -1.0, 10), (raised, -1.0, 10))
         ):
             move(posture, grip, settle)
             watch(simulation, f"{len(result.lifted)}_{stage}")
@@ -377,17 +384,25 @@ def _lift(
 def _grasp(
     arm: Arm, point: np.ndarray, approach: np.ndarray, postures: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Postures that hold at a point, and `HOVER` before it; None where neither is reached without touching anything."""
+    """Postures that hold at a point, and `HOVER` before it; None where neither is reached without touching anything, or
+    the hand cannot go up from there."""
     for q in postures:
         q, off, turned = arm.solve(q, point, approach, None)
         _, _, side = arm.put(q)
         if off > 0.004 or turned > 0.1 or abs(side[2]) > 0.2 or arm.collides():
             continue
-        hover, off, _ = arm.solve(q, point - HOVER * approach, approach, None)
+        hover, off, _ = arm.solve(q, point - HOVER * approach, approach, _kept(side, q))
         arm.put(hover)
-        if off < 0.01 and not arm.collides() and np.abs(hover - q).max() < 1.5:
+        if off > 0.01 or arm.collides() or np.abs(hover - q).max() > MOST_BEND:
+            continue
+        if arm.solve(q, point + RAISE, approach, _kept(side, q))[1] < 0.01:
             return q, hover
     return None
+
+
+def _kept(side: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+    """The finger axis that postures near q are to keep; None: the arm has too few joints to choose it."""
+    return side.copy() if len(q) >= 6 else None
 
 
 def _in_the_way(arm: Arm, grasp: np.ndarray, hover: np.ndarray) -> bool:
@@ -429,7 +444,7 @@ def _places(
             yield name, points[k], good[k][2] / np.linalg.norm(good[k][2]), [good[i][0] for i in order]
 
 
-def _move(simulation: Simulation, hand: Hand, q: np.ndarray, grip: float, settle: int = 3, speed: float = 1.0) -> None:
+def _move(simulation: Simulation, hand: Hand, q: np.ndarray, grip: float, settle: int = 3, speed: float = 0.5) -> None:
     """Brings the arm's servos to q, all joints at once, and waits."""
     robots, robot = simulation.robots, simulation.scene.agents[0]
     assert isinstance(robot, UrdfRobot)

@@ -24,6 +24,7 @@ from ig2mj.tasks.custom.code import blamed
 from ig2mj.tasks.homes import AnyTask, check_inside
 from ig2mj.tasks.navigation.companions import wanderers
 from ig2mj.tasks.navigation.objective import NavigationObjective
+from ig2mj.tasks.navigation.reach_starts import make_reach_starts, standing_spot
 from ig2mj.tasks.navigation.starts import make_starts
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.objective import Objective
@@ -95,7 +96,7 @@ def check_able(task: AnyTask, name: str, body: TaskRobot) -> None:
         role_of(task, name, body)
         return
     others = f"({', '.join(task.robots)} can)"
-    if isinstance(task, NavigationTask) and not body.drives:
+    if isinstance(task, NavigationTask) and not body.drives and (task.goal != "reach" or not body.hand_count):
         raise EngineError(f"robot '{name}' does not drive: it cannot do {task.name} {others}")
     if not body.hand_count and not (isinstance(task, NavigationTask) and task.goal == "point"):
         raise EngineError(f"robot '{name}' has no hand: it cannot do {task.name} {others}")
@@ -194,11 +195,14 @@ def setup_navigation(
     control = control.of(first)
     check_able(task, name, first)
     others = [TurtleBot(name=f"other_{k}") for k in range(task.others)]
-    robots: list[Robot] = [first, *others]
     objects = (*task.objects, *task.added)
+    bare = load_scene(task.home, objects=objects)
+    if not first.drives:  # it reaches from where most floor is free
+        first = first.at(*standing_spot(bare), 0.0)
+    robots: list[Robot] = [first, *others]
     scene = load_scene(task.home, agents=robots, objects=objects)
     rules = Rules.of_scene(scene)
-    starts = make_starts(task, load_scene(task.home, objects=objects), scene, rules.initial, split, count)
+    starts = (make_starts if first.drives else make_reach_starts)(task, bare, scene, rules.initial, split, count)
     controllers = tuple(r.controller(scene.tables, k, control.period) for k, r in enumerate(robots))
     arm = task.goal in ("reach", "close")
     companions = None

@@ -69,7 +69,8 @@ class NavigationObjective:
         self._hand = int(np.flatnonzero(tables.hand_agent == 0)[0]) if task.goal == "reach" else -1
         strewn = scene.additions[: len(task.objects)]
         self._loose = np.array([scene.object_index(a.name) for a in strewn], int)
-        self._height = float(starts.pool.physics.whole("qpos")[0, _free_address(scene) + 2])
+        free = _free_address(scene)
+        self._height = -np.inf if free is None else float(starts.pool.physics.whole("qpos")[0, free + 2])
         opened = np.isin(np.array(tables.object_categories)[tables.openable_object], task.opened)
         self._joints = np.flatnonzero(opened)
         kinds = [_joint_type(scene, int(tables.openable_qposadr[j])) for j in self._joints]
@@ -215,8 +216,10 @@ class NavigationObjective:
         return jnp.abs(jnp.asarray(view.joint_pos)[:, self._joints] - self._closed)
 
 
-def _free_address(scene: Scene) -> int:
-    return int(scene.model.jnt_qposadr[scene.model.body_jntadr[scene.tables.agent_body[0]]])
+def _free_address(scene: Scene) -> int | None:
+    """Of the first robot's base in qpos; None: it is bolted to the floor."""
+    joint = int(scene.model.body_jntadr[scene.tables.agent_body[0]])
+    return None if joint < 0 else int(scene.model.jnt_qposadr[joint])
 
 
 def _joint_type(scene: Scene, address: int) -> int:

@@ -333,6 +333,11 @@ class _Households:
         return None if (others.shoved() & ~moved[0]).any() else query.save()
 
 
+def still_household(bare: Scene) -> Snapshot:
+    """A scene without robots at rest, all doors between rooms wide open."""
+    return _settled_with_open_doors(SceneQuery(bare, NativeEngine(bare, 1)))
+
+
 def _settled_with_open_doors(query: SceneQuery) -> Snapshot:
     """The scene at rest, all doors between rooms wide open."""
     tables, model = query.scene.tables, query.scene.model
