@@ -337,7 +337,7 @@ def sheet(
     entries = _entries(only)
     check_image(out)
     use_opengl()
-    chosen = [build_model(e, k, seed) for e in entries for k in range(min(models, e.count))]
+    chosen = [build_model(e, k, seed) for e in entries for k in range(min(models, e.count + e.extra))]
     contact_sheet(chosen, opened=opened, collision=collision).save(out)
     print(f"{out}: {len(chosen)} model{'s' * (len(chosen) != 1)}")
 
