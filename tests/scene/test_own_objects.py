@@ -9,7 +9,7 @@ from own_objects import HALF
 import ig2mj
 from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
 from ig2mj.scene import own_libraries
-from ig2mj.scene.found_again import find_again
+from ig2mj.scene.found_again import entries_of, find_again, requests_again
 from ig2mj.scene.library import find_model, own_library
 from ig2mj.scene.object_requests import read_request
 
@@ -188,6 +188,20 @@ def test_an_object_that_has_moved_is_found_again_in_a_library_by_its_hash(tiny_h
     assert found.folder == str(now)
     scenes = [ig2mj.load_scene(tiny_home_folder, objects=a.wanted) for a in (found,)]
     assert scenes[0].object_names[-1] == "cup_0"
+
+
+def test_texts_of_a_file_lead_to_where_an_object_is_now(tiny_home_folder, cup, tmp_path, monkeypatch):
+    was, now = tmp_path / "was" / "cup", tmp_path / "now" / "cup"
+    shutil.copytree(cup, was)
+    entries = entries_of(ig2mj.load_scene(tiny_home_folder, objects=[was, "mug"]).additions)
+    now.parent.mkdir()
+    was.rename(now)
+    monkeypatch.setenv("IG2MJ_OBJECTS", str(now.parent))
+    texts = requests_again([f"{was}@on_top:box", "remove:can", "mug"], entries, "policy.npz")
+    assert sorted(texts) == sorted((f"{now}@on_top:box", "remove:can", "mug"))
+    for wrong in ([], [{"name": 3}]):
+        with pytest.raises(InputError, match=r"policy\.npz"):
+            requests_again(["mug"], wrong, "policy.npz")
 
 
 def test_requests_tell_folder_place_and_predicate_apart():
