@@ -1,11 +1,15 @@
 """Tasks with objects added to their home."""
 
+import shutil
+
 import pytest
 
 from ig2mj.demos.task_hash import task_hash
 from ig2mj.envs.config import EnvConfig
 from ig2mj.envs.registry import find_task
 from ig2mj.errors import Ig2mjError, UnknownNameError
+from ig2mj.scene.library import find_model
+from ig2mj.scene.object_requests import read_request
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.added_objects import object_texts, with_objects
 
@@ -24,6 +28,14 @@ def test_in_navigation_objects_stay_where_they_are_put(cup):
     task = with_objects(find_task("InteractiveNavigation"), cup)
     assert task.added == (str(cup),)
     assert task.objects == find_task("InteractiveNavigation").objects, "only these are strewn about"
+
+
+def test_tasks_that_ship_take_the_library_whatever_the_working_directory_holds(cup, tmp_path, monkeypatch):
+    shutil.copytree(cup, tmp_path / "steak")
+    monkeypatch.chdir(tmp_path)
+    task = with_objects(ACTIVITIES["CookingMeat"], ())
+    assert task.objects == ("steak",) == ACTIVITIES["CookingMeat"].objects
+    assert [find_model(read_request(text).reference).own for text in (*task.objects, "steak")] == [False, True]
 
 
 def test_texts_hold_whole_paths_and_are_kept_with_an_environment(cup, monkeypatch):

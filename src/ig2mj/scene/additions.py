@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 
 from ig2mj.errors import Ig2mjError, InputError
-from ig2mj.scene.library import LibraryModel, find_model
+from ig2mj.scene.library import LibraryModel, LibraryName, find_model
 from ig2mj.scene.manifest import JointEntry, LinkEntry, Manifest, ObjectEntry, OpenableEntry
 from ig2mj.scene.mjcf_files import read_mjcf
 from ig2mj.scene.mjcf_text import make_absolute, rename
@@ -78,7 +78,7 @@ class Addition:
 
     def find(self) -> LibraryModel:
         """Its model, read again. Raises as `find_model`."""
-        return find_model(self.reference)
+        return find_model(self.reference if self.named else LibraryName(self.reference))
 
 
 def name_additions(taken: Iterable[str], wanted: Sequence[str]) -> list[tuple[str, LibraryModel]]:

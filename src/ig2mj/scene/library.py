@@ -34,6 +34,13 @@ ROBOT = "agent"
 CONVERT = "`ig2mj convert object --urdf FILE --category CATEGORY --out DIR` writes such a folder"
 
 
+class LibraryName(str):
+    """A name of the object library that is never read as a folder, as of the tasks that ship: the working directory may
+    hold a folder of the same name."""
+
+    __slots__ = ()
+
+
 @dataclasses.dataclass(frozen=True)
 class LibraryModel:
     """One model.
@@ -167,7 +174,7 @@ def find_model(wanted: str) -> LibraryModel:
     Raises:
       UnknownNameError: there is no such category or model. ManifestError, InputError: see `read_model`, `own_library`.
     """
-    folder = folder_of(wanted)
+    folder = None if isinstance(wanted, LibraryName) else folder_of(wanted)
     if folder is not None:
         return read_model(folder, named=True)
     category, _, model = wanted.partition("/")

@@ -21,7 +21,7 @@ import re
 from typing import Literal
 
 from ig2mj.errors import Ig2mjError
-from ig2mj.scene.library import folder_of
+from ig2mj.scene.library import LibraryName, folder_of
 
 Place = tuple[float, float, float, float]
 """x, y, z (m) of an object's frame, and degrees that it is turned about the vertical."""
@@ -55,10 +55,12 @@ def read_request(wanted: str | os.PathLike) -> ObjectRequest:
     """One value of `objects`. Raises Ig2mjError: it is none."""
     if not isinstance(wanted, str | os.PathLike) or not os.fspath(wanted):
         raise Ig2mjError(f"objects: {wanted!r} is neither a folder nor a name of the object library, such as 'plate'")
-    text = os.fspath(wanted)
+    text, of_library = os.fspath(wanted), isinstance(wanted, LibraryName)
     reference, mark, where = text.rpartition("@")
-    if not mark or folder_of(text) is not None:
+    if not mark or (not of_library and folder_of(text) is not None):
         return ObjectRequest(text, text)
+    if of_library:
+        reference = LibraryName(reference)
     kind, colon, numbers = where.partition(":")
     if colon and kind in ("fixed", "loose"):
         return ObjectRequest(text, reference, _place(text, numbers, 7 if kind == "loose" else 4), kind)

@@ -12,12 +12,14 @@ from collections.abc import Sequence
 from ig2mj.errors import Ig2mjError
 from ig2mj.scene.additions import name_additions
 from ig2mj.scene.changes import added, read_change
-from ig2mj.scene.library import find_model
+from ig2mj.scene.library import LibraryName, find_model
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.object_requests import read_request
 from ig2mj.scene.paths import scene_folder
 from ig2mj.scene.scene import Objects
+from ig2mj.tasks.bddl.task import BddlTask
 from ig2mj.tasks.homes import AnyTask
+from ig2mj.tasks.registry import TASKS
 from ig2mj.tasks.task import Task
 
 
@@ -31,6 +33,8 @@ def with_objects(task: AnyTask, objects: Objects) -> AnyTask:
     Raises:
       UnknownNameError: there is no such object. Ig2mjError: a place is none.
     """
+    if task.name in TASKS and not isinstance(task, BddlTask):
+        task = dataclasses.replace(task, objects=tuple(map(LibraryName, task.objects)))
     references = object_texts(objects)
     if not references:
         return task
