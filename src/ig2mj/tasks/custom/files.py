@@ -12,6 +12,7 @@ from typing import Any
 
 from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
 from ig2mj.install_hint import pip_install_module
+from ig2mj.plugins.named_files import import_named
 from ig2mj.tasks.bddl.task import DEFINITION, PREFIX, bddl_task
 from ig2mj.tasks.custom.code import line_in, shown
 from ig2mj.tasks.custom.definition import CustomTask, RegisteredTask, register
@@ -26,7 +27,11 @@ VARIABLE = "IG2MJ_TASKS"
 
 
 def import_files() -> None:
-    """Registers the tasks of the files of `VARIABLE`: of Python, or BDDL definitions. Raises as `task_of_file`."""
+    """Registers the tasks of the files of `VARIABLE`: of Python, or BDDL definitions. Raises as `task_of_file`.
+
+    Files of plug-ins may register tasks, too (`ig2mj.plugins`).
+    """
+    import_named()
     for file in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
         if file.endswith(DEFINITION):
             _register_definition(file)
