@@ -76,7 +76,8 @@ class Predicate:
       name: snake_case. arguments: what each argument is; an agent's index is the number of objects plus its own.
         evaluate: truth for argument tuples. ability: without it the first argument's answer is False.
         aliases: other names (iGibson's, BDDL's tokens, the paper's). queries: relations it needs. why: for people, the
-        numbers behind the answer in one world. per_object: see `of_states`.
+        numbers behind the answer in one world. per_object: see `of_states`. of_arguments: of what a view says of
+        objects it reads only its arguments (their links, bodies and joints), and floors (`goal_rows`).
       set: new fields of the states in which it is true, or false, of the masked objects; of plug-ins' predicates of one
         object.
     """
@@ -90,6 +91,7 @@ class Predicate:
     why: Why | None = None
     per_object: OfStates | None = None
     set: SetTruth | None = None
+    of_arguments: bool = False
 
     @classmethod
     def of_states(cls, of_states: OfStates, **fields: Any) -> Predicate:

@@ -162,6 +162,7 @@ def particle_state(
     ability: str,
     rows_of: Callable[[StateModel], Int[np.ndarray, "R"]],
     update: Callable[[EventStep], Particles],
+    idle: Callable[[EventStep], Bool[Array, ""]],
     aliases: tuple[str, ...],
 ) -> StateSpec:
     """A state that is a row of particles for every object with an ability; its value is the level.
@@ -169,7 +170,7 @@ def particle_state(
     Args:
       name: also of the field of `ExtendedStates`, and of the manifest's list of particles: null, or {"body", "pos",
         "quat"} whose z axis is the normal. What is there counts as placed.
-      rows_of: objects of the rows. update: the particles after a step.
+      rows_of: objects of the rows. update: the particles after a step. idle: see `StateSpec`.
     """
 
     def get(model: StateModel, states: Any, view: PhysicsView, obj: int, world: int) -> float:
@@ -199,6 +200,7 @@ def particle_state(
         fields={name: Particles},
         initial=lambda model: {name: no_particles(1, len(rows_of(model)))},
         update=lambda step: step.having(**{name: update(step)}),
+        idle=idle,
         inherit=lambda states, cut: {name: inherit(getattr(states, name), rows_of(cut.model), cut)},
         from_manifest=from_manifest,
     )

@@ -123,6 +123,7 @@ Initial = Callable[["StateModel"], Values]
 Queries = Callable[["StateModel"], "list[Query]"]
 Inherit = Callable[["ExtendedStates", Cut], Values]
 Set = Callable[["ExtendedStates", Bool[Array, "#W O"], Any], Values]
+Idle = Callable[[EventStep], Bool[Array, ""]]
 Update = Callable[[Any], Any]
 
 
@@ -153,6 +154,8 @@ class StateSpec:
       fields: names and jaxtyping annotations of its arrays (or pytrees of arrays) in `ExtendedStates`, W first.
       initial: all its fields at the start, in one world: NumPy arrays whose world axis is 1 long.
       update: from `EventStep` or `HeatStep` to the same; `given_from_outside` where it changes only when set.
+      idle: of a state in `update.EVENTS`: whether `update` changes no state of any world in this step, cheaper to find
+        than by updating; None: it is always updated.
       inherit: its fields after halves took over what their wholes had, from (states, `Cut`); `nothing_inherited`.
       from_manifest: writes what a manifest says of one object into `Saved.states`; `nothing_saved`.
       set: new fields from (states, mask of objects, number or switch); None: cannot be set by name.
@@ -172,6 +175,7 @@ class StateSpec:
     fields: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     initial: Initial | None = None
     update: Update | None = None
+    idle: Idle | None = None
     inherit: Inherit | None = None
     from_manifest: Callable[[Saved], None] | None = None
     set: Set | None = None

@@ -104,10 +104,30 @@ def events(
     for spec in (*EVENTS, *_added(model, "events")):
         assert spec.update is not None
         step = spec.update(step)
-    opened = open.is_open(model, view.joint_pos)
-    on = heat_source.switched_on(model, step.states.toggled_on, opened)
-    acts = heat_source.acts_on(model, on, view, relations)
-    return step.states, step.swap, _as_wholes(model, step.cut_now, acts)
+    return step.states, step.swap, _as_wholes(model, step.cut_now, sources(model, step.states, view, relations))
+
+
+def can_be_idle(model: StateModel) -> bool:
+    """Whether `idle` is ever true, and the second part then depends on nothing but temperatures and sources."""
+    every = (*EVENTS, *_added(model, "events"))
+    return not model.options.contact_heat_rate and not _added(model, "heat") and all(s.idle is not None for s in every)
+
+
+@entry_point
+def idle(model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations) -> Bool[Array, ""]:
+    """Whether `events` changes no state of any world and moves nothing; false where a state cannot tell
+    (`StateSpec.idle`)."""
+    step, found = EventStep.start(model, states, view, relations), jnp.array(True)
+    for spec in (*EVENTS, *_added(model, "events")):
+        found &= False if spec.idle is None else spec.idle(step)
+    return found
+
+
+@entry_point
+def sources(model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations) -> Bool[Array, "W O S"]:
+    """Which heat source acts on what, where nothing was cut in this step."""
+    on = heat_source.switched_on(model, states.toggled_on, open.is_open(model, view.joint_pos))
+    return heat_source.acts_on(model, on, view, relations)
 
 
 @entry_point

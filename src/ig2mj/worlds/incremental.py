@@ -5,13 +5,16 @@ control step runs MuJoCo and `Rules.step` in full. Results are the same to the b
 (`tests/worlds/test_incremental_is_the_plain_path.py`).
 
 The core calls `IncrementalRules.of(rules, engine).step(states, view) -> Outcome` where it calls `rules.step` on other
-engines, with the states and the view of each control step. Three facts decide what runs:
+engines, with the states and the view of each control step. Five facts decide what runs:
 
 - All of a step is a pure function of the states and the view. Where both are those of the last step and the last step
   changed no state, its outcome is returned.
-- The first part of a step (`states.update.events`) reads no temperature. Where the view is that of the last whole step,
-  which changed nothing but temperatures, only the second part (`states.update.heat`) runs, and the goal where it
-  depends on what that changed.
+- The first part of a step (`states.update.events`) reads no temperature. Where the view is that of the last step, which
+  changed nothing but temperatures, only the second part (`states.update.heat`) runs.
+- Where something has moved, two small programs take the place of the first part: `states.update.idle` says whether it
+  would change anything, `states.update.sources` which heat sources act. Each is called only where a field that it reads
+  has changed. While sources act on the same objects, temperatures go on as before.
+- A goal is evaluated where something that it reads has changed (`ig2mj.worlds.incremental_goal`).
 - The native engine marks views between which nothing but agents moved (`engine.view.but_agents`). Such a view counts as
   the same, unless the states or the goal read what differs. Fingers count as the same while all are out of reach of all
   buttons.
@@ -19,13 +22,13 @@ engines, with the states and the view of each control step. Three facts decide w
 Updates of plug-ins' states are traced (`ig2mj.states.added_checks`). Where one reads temperatures in the first part, or
 changes other states in the second, every step is a whole one.
 
-Axes: W worlds, O objects, S heat sources, L literals.
+Axes: W worlds, O objects, S heat sources.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import jax
@@ -35,30 +38,21 @@ from jaxtyping import Bool
 
 from ig2mj.engine.base import Engine
 from ig2mj.engine.native.execution import HostFunction
-from ig2mj.engine.view import Array, PhysicsView, but_agents
-from ig2mj.predicates.compile import CompiledExpression, GoalStatus
-from ig2mj.predicates.host_queries import HostQueries
-from ig2mj.predicates.registry import find
+from ig2mj.engine.view import Array, PhysicsView, but_agents, read_field
 from ig2mj.states.added_checks import AddedUpdates
-from ig2mj.states.definitions import toggled_on
+from ig2mj.states.definitions import heat_source, toggled_on
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
-from ig2mj.states.update import events, heat, heat_fields, queries
+from ig2mj.states.update import can_be_idle, events, heat, heat_fields, idle, queries, sources
 from ig2mj.states.world import ExtendedStates, Swap
+from ig2mj.worlds.incremental_goal import AHEAD, GoalPrograms, IncrementalGoal, TemperatureSteps
 from ig2mj.worlds.rules import Outcome, Rules
 
 FINGERS = "agent.finger_pos"
 
-MANY = 24
-"""Relations of a goal from which on one world asks the host's questions."""
-
-AHEAD = 16
-"""Steps of temperatures that one call computes: a call takes 40 us, and what it computes hardly counts. Steps that
-something overtakes are discarded."""
-
 SCENES = 8
-"""Scenes, and goals, whose programs are kept: those stepped last."""
+"""Scenes whose programs are kept: those stepped last."""
 
 
 def rules_step(rules: Rules, engine: Engine) -> Callable[[ExtendedStates, PhysicsView], Outcome]:
@@ -76,11 +70,14 @@ class IncrementalRules:
           enabled: the switch; False: each step is a whole one.
         """
         self._enabled = enabled and not AddedUpdates.of(rules.model).whole
-        self._programs, self._goal = _StatePrograms.of(rules.model, num_worlds), _Goal.of(rules.goal, num_worlds)
+        self._programs = _StatePrograms.of(rules.model, num_worlds)
+        self._goal = IncrementalGoal(GoalPrograms.of(rules.goal, num_worlds))
         self._last: Outcome | None = None
-        self._acts: Array | None = None  # of the last whole step; None: the next step is a whole one
+        self._leaves: list[Array] = []  # of the last step's states
+        self._acts: Array | None = None  # source on object [W, O, S] then; None: the next step is a whole one
         self._settled = False  # the last step changed no state
-        self._ahead: Iterator[_Heat] = iter(())  # the next steps of temperatures
+        self._ahead: TemperatureSteps | None = None  # the next steps of temperatures, of which `_ahead_over` are over
+        self._ahead_over = 0
         self._view: PhysicsView | None = None
         self._fingers_away: bool | None = None  # in `_view`; None: not looked at
 
@@ -92,67 +89,92 @@ class IncrementalRules:
     def step(self, states: ExtendedStates, view: PhysicsView) -> Outcome:
         """`Rules.step`: one control step; `view` is physics after it."""
         last = self._last
-        if (
-            not self._enabled
-            or last is None
-            or self._acts is None
-            or states is not last.states
-            or not self._is_same(view)
-        ):
-            return self._whole_step(states, view)
+        if not self._enabled or last is None or self._acts is None or states is not last.states:
+            return self._whole_step(states, jax.tree.leaves(states), view)
+        if view is not self._view and not self._is_same(view) and not self._is_idle(view):
+            return self._whole_step(states, self._leaves, view)
         if self._settled:
-            return last
-        after = next(self._ahead, None)
-        if after is None:
-            self._ahead = self._programs.heat(states, self._acts, view)
-            after = next(self._ahead)
-        fields, changed = after
-        states, self._settled = states.replace(**fields), not changed
-        status = last.status if self._goal.heat_reads.isdisjoint(changed) else self._goal(view, states)
+            if self._goal.goes_on(view):
+                return last
+            status = self._goal.evaluate(view, self._leaves)
+        else:
+            if self._ahead is None or self._ahead_over == AHEAD:
+                self._ahead, self._ahead_over = self._programs.heat(self._leaves, self._acts, view), 0
+            ahead, k = self._ahead, self._ahead_over
+            self._ahead_over += 1
+            made, same = ahead.step(k)
+            self._settled = all(same)
+            for place, leaf in zip(self._programs.heat_places, made, strict=True):
+                self._leaves[place] = leaf
+            states = jax.tree.unflatten(self._programs.structure, self._leaves)
+            changed = [n for n, is_same in zip(self._programs.heat_names, same, strict=True) if not is_same]
+            status = self._goal.after_heat(view, self._leaves, ahead, k, changed)
         self._last = Outcome(states, None, status)
         return self._last
 
-    def _whole_step(self, states: ExtendedStates, view: PhysicsView) -> Outcome:
-        done = self._programs.step(states, view)
-        self._view, self._fingers_away, self._ahead = view, None, iter(())
+    def _whole_step(self, states: ExtendedStates, leaves: list[Array], view: PhysicsView) -> Outcome:
+        done = self._programs.step(leaves, view)
+        self._view, self._fingers_away, self._ahead, self._leaves = view, None, None, done.leaves
         self._acts, self._settled = done.acts if done.quiet else None, done.settled
-        self._last = Outcome(done.states, None, self._goal(view, done.states))
+        after = jax.tree.unflatten(self._programs.structure, done.leaves)
+        self._last = Outcome(after, None, self._goal.evaluate(view, done.leaves))
         return self._last._replace(swap=done.swap)
 
     def _is_same(self, view: PhysicsView) -> bool:
-        """Whether the view is that of the last step in all that a step reads."""
-        if view is self._view:
-            return True
+        """Whether the view is that of the last step in all that the states read."""
         scene = but_agents(view)
         if scene is None or self._view is None or scene is not but_agents(self._view):
             return False
-        if self._goal.reads_agents or not self._programs.agent_reads <= {FINGERS}:
+        reads = self._programs.agent_reads
+        if reads and (self._programs.fingers_matter or reads != {FINGERS} or not self._are_fingers_away(view)):
             return False
-        if self._programs.agent_reads:
-            model = self._programs.model
-            if self._programs.fingers_matter:
-                return False
-            if self._fingers_away is None:
-                self._fingers_away = toggled_on.all_out_of_reach(model, self._view)
-            if not self._fingers_away or not toggled_on.all_out_of_reach(model, view):
-                return False
         self._view = view
         return True
 
+    def _is_idle(self, view: PhysicsView) -> bool:
+        """Whether nothing but temperatures changes in this step; notes which sources act in it."""
+        programs, before = self._programs, self._view
+        if not programs.tells_idle or before is None:
+            return False
+        fingers, others = programs.idle_reads(self._leaves, view)
+        same = _are_equal(view, before, others) and (not fingers or self._are_fingers_away(view))
+        if not same and not programs.idle(self._leaves, view):
+            return False
+        acts = programs.acts(self._leaves, view)
+        if acts is not self._acts and not np.array_equal(acts, np.asarray(self._acts)):
+            self._settled, self._ahead = False, None
+        self._acts, self._view = acts, view
+        if not same:
+            self._fingers_away = None
+        return True
 
-_Heat = tuple[dict[str, Array], list[str]]
-"""A step of temperatures: fields of the states after it, and the names of those that it changed."""
+    def _are_fingers_away(self, view: PhysicsView) -> bool:
+        """Whether no finger is anywhere near a button, neither in the last step's view nor in this one."""
+        model = self._programs.model
+        if self._fingers_away is None:
+            assert self._view is not None
+            self._fingers_away = toggled_on.all_out_of_reach(model, self._view)
+        return self._fingers_away and toggled_on.all_out_of_reach(model, view)
+
+
+def _are_equal(one: PhysicsView, other: PhysicsView, names: Iterable[str]) -> bool:
+    """Whether fields of two views are the same; what is on a device is not compared."""
+    for name in names:
+        a, b = read_field(one, name), read_field(other, name)
+        if a is not b and not (isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and a.tobytes() == b.tobytes()):
+            return False
+    return True
 
 
 class _Step(NamedTuple):
     """What a whole step of the states gives.
 
     Attributes:
-      states: after it. swap: teleports that slicing asks for; None where there are none. acts: source on object
-        [W, O, S]. quiet: nothing but temperatures has changed. settled: nothing has.
+      leaves: of the states after it. swap: teleports that slicing asks for; None where there are none. acts: source on
+      object [W, O, S]. quiet: nothing but temperatures has changed. settled: nothing has.
     """
 
-    states: ExtendedStates
+    leaves: list[Array]
     swap: Swap | None
     acts: Array
     quiet: bool
@@ -160,13 +182,28 @@ class _Step(NamedTuple):
 
 
 class _StatePrograms:
-    """The compiled steps of a scene's states. They return only the arrays that a step can change."""
+    """The compiled steps of a scene's states. They return only the arrays that a step can change.
+
+    Attributes:
+      structure: of the states, as a pytree. heat_places, heat_names: of the leaves that the second part changes, their
+        places among the states' and the names of their fields. fingers_matter: also where they are out of reach of
+        buttons. tells_idle: `idle` is of use.
+    """
 
     def __init__(self, model: StateModel, num_worlds: int):
         self.model, self._plan = model, RelationPlan.build(model, queries(model))
-        self._heat_fields = heat_fields(model)
-        self.fingers_matter = FINGERS in AddedUpdates.of(model).reads  # also where they are out of reach of buttons
+        named, self.structure = jax.tree_util.tree_flatten_with_path(initial_states(model, num_worlds))
+        names = [path[0].name for path, _ in named]
+        self.heat_places = [place for place, name in enumerate(names) if name in heat_fields(model)]
+        self.heat_names = [names[place] for place in self.heat_places]
+        self.fingers_matter = FINGERS in AddedUpdates.of(model).reads
+        self.tells_idle = can_be_idle(model) and not self.fingers_matter
         self._step, self._heat = HostFunction(self._rules_fn), HostFunction(self._heat_fn)
+        self._idle, self._acts = HostFunction(self._idle_fn), HostFunction(self._acts_fn)
+        self._none_act = np.zeros((num_worlds, model.tables.num_objects, len(model.parameters.heat_object)), bool)
+        self._of_view_and_states = jax.tree.structure((0, [0] * len(names)))
+        self._with_acts = jax.tree.structure((0, [0] * len(names), 0))
+        self._idle_reads: tuple[bool, list[str]] | None = None  # known once it was traced
         self._changed: list[int] = []  # leaves of the states that a step can change; known once it was traced
 
     @staticmethod
@@ -180,110 +217,73 @@ class _StatePrograms:
         """Fields of agents that a step reads; known after the first step."""
         return frozenset(filter(_is_of_agents, self._step.reads | self._heat.reads))
 
-    def step(self, states: ExtendedStates, view: PhysicsView) -> _Step:
+    def step(self, leaves: list[Array], view: PhysicsView) -> _Step:
         """The whole of `states.update.update`."""
-        made, swap, acts, flags = self._step(view, states)
-        leaves, structure = jax.tree.flatten(states)
+        made, swap, acts, flags = self._step.flat([view, *leaves], self._of_view_and_states)
+        leaves = list(leaves)
         for place, leaf in zip(self._changed, made, strict=True):
             leaves[place] = leaf
-        quiet, settled, swapped = np.asarray(flags).tolist()
-        return _Step(jax.tree.unflatten(structure, leaves), Swap(*swap) if swapped else None, acts, quiet, settled)
+        quiet, settled, swapped = flags.tolist()
+        return _Step(leaves, Swap(*swap) if swapped else None, acts, quiet, settled)
 
-    def heat(self, states: ExtendedStates, acts: Array, view: PhysicsView) -> Iterator[_Heat]:
-        """The second part of `update` in each of the next steps, as long as nothing else changes: its fields of the
-        states, and the names of those that it changed."""
-        made, same = self._heat(view, states, acts)
-        for k, kept in enumerate(same.tolist()):
-            changed = [name for name, is_same in zip(self._heat_fields, kept, strict=True) if not is_same]
-            yield {name: _row(steps, k) for name, steps in zip(self._heat_fields, made, strict=True)}, changed
+    def idle_reads(self, leaves: list[Array], view: PhysicsView) -> tuple[bool, list[str]]:
+        """Whether the answer of `idle` depends on fingers, and on which other fields of the view."""
+        if self._idle_reads is None:
+            reads = self._idle.traced([view, *leaves], self._of_view_and_states)
+            self._idle_reads = FINGERS in reads, sorted(reads - {FINGERS})
+        return self._idle_reads
 
-    def _rules_fn(self, view: PhysicsView, states: ExtendedStates) -> tuple[Any, ...]:
+    def idle(self, leaves: list[Array], view: PhysicsView) -> bool:
+        """Whether the first part of `update` changes nothing."""
+        return bool(self._idle.flat([view, *leaves], self._of_view_and_states))
+
+    def acts(self, leaves: list[Array], view: PhysicsView) -> Bool[np.ndarray, "W O S"]:
+        """Which source acts on what."""
+        if heat_source.all_out_of_reach(self.model, view):
+            return self._none_act
+        return self._acts.flat([view, *leaves], self._of_view_and_states)
+
+    def heat(self, leaves: list[Array], acts: Array, view: PhysicsView) -> TemperatureSteps:
+        """The second part of `update` in each of the next steps."""
+        made, same = self._heat.flat([view, *leaves, acts], self._with_acts)
+        return TemperatureSteps(made, same.tolist())
+
+    def _rules_fn(self, view: PhysicsView, before: list[Array]) -> tuple[Any, ...]:
+        states = jax.tree.unflatten(self.structure, before)
         after, swap, acts = events(self.model, states, view, self._plan.evaluate(view))
         new = heat(self.model, after, acts, view)
         quiet, same = _are_same(states, after), _are_same(after, new)
-        before, made = jax.tree.leaves(states), jax.tree.leaves(new)
+        made = jax.tree.leaves(new)
         self._changed = [i for i, leaf in enumerate(made) if leaf is not before[i]]
         flags = jnp.stack([quiet, quiet & same, jnp.any(swap.mask)])
         return [made[i] for i in self._changed], (swap.mask, swap.pos, swap.quat), acts, flags
 
-    def _heat_fn(self, view: PhysicsView, states: ExtendedStates, acts: Array) -> tuple[list[Any], Array]:
-        names = self._heat_fields
+    def _idle_fn(self, view: PhysicsView, leaves: list[Array]) -> Array:
+        return idle(self.model, jax.tree.unflatten(self.structure, leaves), view, self._plan.evaluate(view))
 
-        def step(before: list[Any], _: None) -> tuple[list[Any], tuple[list[Any], Array]]:
-            now = states.replace(**dict(zip(names, before, strict=True)))
-            new = heat(self.model, now, acts, view)
-            after = [getattr(new, name) for name in names]
-            same = jnp.stack([_are_same(a, b) for a, b in zip(before, after, strict=True)])
+    def _acts_fn(self, view: PhysicsView, leaves: list[Array]) -> Array:
+        return sources(self.model, jax.tree.unflatten(self.structure, leaves), view, self._plan.evaluate(view))
+
+    def _heat_fn(self, view: PhysicsView, leaves: list[Array], acts: Array) -> tuple[list[Any], Array]:
+        def step(before: list[Array], _: None) -> tuple[list[Array], tuple[list[Array], Array]]:
+            every = list(leaves)
+            for place, leaf in zip(self.heat_places, before, strict=True):
+                every[place] = leaf
+            new = jax.tree.leaves(heat(self.model, jax.tree.unflatten(self.structure, every), acts, view))
+            after = [new[place] for place in self.heat_places]
+            same = jnp.stack([jnp.all(a == b) for a, b in zip(before, after, strict=True)])
             return after, (after, same)
 
-        start = [jax.tree.map(jnp.asarray, getattr(states, name)) for name in names]
-        return jax.lax.scan(step, start, None, AHEAD)[1]
+        start: list[Array] = [jnp.asarray(leaves[place]) for place in self.heat_places]
+        made, same = jax.lax.scan(step, start, None, AHEAD)[1]
+        return [jnp.moveaxis(steps, 0, 1) for steps in made], same
 
 
-def _row(tree: Any, k: int) -> Any:
-    """One step of a field, which is an array or a pytree of arrays."""
-    return tree[k] if isinstance(tree, np.ndarray | jax.Array) else jax.tree.map(lambda leaf: leaf[k], tree)
-
-
-def _are_same(one: Any, other: Any) -> Bool[Array, ""]:
-    """Whether all numbers of two pytrees are equal; arrays that are one object are not compared."""
+def _are_same(one: ExtendedStates, other: ExtendedStates) -> Bool[Array, ""]:
+    """Whether all numbers of two states are equal; arrays that are one object are not compared."""
     leaves = zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True)
     return jnp.all(jnp.array([True, *(jnp.all(a == b) for a, b in leaves if a is not b)]))
 
 
 def _is_of_agents(field: str) -> bool:
     return field.startswith("agent.")
-
-
-class _Goal:
-    """The status of a goal, compiled.
-
-    One world with a goal of many relations asks the host's questions, whose programs the goals of a scene share: a
-    program of the goal's own would take seconds to compile.
-    """
-
-    def __init__(self, goal: CompiledExpression | None, num_worlds: int):
-        self._goal, self._none = goal, GoalStatus.empty(num_worlds)
-        self._questions: HostQueries | None = None
-        if goal is not None and num_worlds == 1 and len(set(goal.queries)) > MANY:
-            self._questions = HostQueries.of(goal.model)
-        self._status = HostFunction(self._status_fn)
-
-    @staticmethod
-    @functools.lru_cache(maxsize=SCENES)
-    def of(goal: CompiledExpression | None, num_worlds: int) -> _Goal:
-        """That of a goal; asked again, the same object."""
-        return _Goal(goal, num_worlds)
-
-    def __call__(self, view: PhysicsView, states: ExtendedStates) -> GoalStatus:
-        if self._goal is None:
-            return self._none
-        if self._questions is not None:
-            return self._goal.status_of(self._questions.facts(self._goal.literals, states, view), states)
-        return GoalStatus(*self._status(view, states))
-
-    @functools.cached_property
-    def reads_agents(self) -> bool:
-        """Whether it depends on agents; known after the first call."""
-        if self._questions is None or self._goal is None:
-            return any(map(_is_of_agents, self._status.reads))
-        reads = (self._questions.reads(find(name)) for name in self._goal.literals.instances)
-        return any(name.startswith("view.agent.") for names in reads for name in names)
-
-    @functools.cached_property
-    def heat_reads(self) -> frozenset[str]:
-        """Fields that `heat` changes on which it depends; known after the first call."""
-        if self._goal is None:
-            return frozenset()
-        if self._questions is not None:
-            reads = (self._questions.reads(find(name)) for name in self._goal.literals.instances)
-            read = {name.split(".")[1] for names in reads for name in names if name.startswith("states.")}
-            return frozenset(heat_fields(self._goal.model)).intersection(read)
-        paths, _ = jax.tree_util.tree_flatten_with_path(initial_states(self._goal.model, 1))
-        names = [path[0].name for path, _ in paths]  # leaf 0 of the arguments is the view
-        return frozenset(names[leaf - 1] for leaf in self._status.takes).intersection(heat_fields(self._goal.model))
-
-    def _status_fn(self, view: PhysicsView, states: ExtendedStates) -> tuple[Array, Array, Array]:
-        assert self._goal is not None
-        status = self._goal.status(states, view)
-        return status.holds, status.fraction, status.literals

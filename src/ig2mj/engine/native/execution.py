@@ -107,19 +107,38 @@ class HostFunction:
         self._function, self._shortcut = function, shortcut
         self._name = getattr(function, "__name__", "function").strip("_")
         self._programs: dict[Any, _Program] = {}  # by structure and shapes of the arguments
+        self._last: tuple[Any, _Program | None] = None, None
 
     def __call__(self, *arguments: Any) -> Any:
         if self._shortcut is not None:
             found = self._shortcut(*arguments)
             if found is not None:
                 return found
-        leaves, structure = jax.tree.flatten(arguments, is_leaf=_is_view)
-        key = structure, *[leaf.__class__ if _is_view(leaf) else getattr(leaf, "shape", ()) for leaf in leaves]
-        program = self._programs.get(key)
-        if program is None:
-            program = self._programs[key] = self._trace(leaves, structure)
+        return self.flat(*jax.tree.flatten(arguments, is_leaf=_is_view))
+
+    def flat(self, leaves: list[Any], structure: Any) -> Any:
+        """The function of flattened arguments, in which a view is one leaf.
+
+        Args:
+          structure: of the arguments. The same object as in the last call: with arrays of the same shapes.
+        """
+        program = self._program(leaves, structure)
         taken = [leaves[i] if read is None else read(leaves[i]) for i, read in program.takes]
         return jax.tree.unflatten(program.structure, program.function(taken))
+
+    def traced(self, leaves: list[Any], structure: Any) -> frozenset[str]:
+        """`reads` of flattened arguments as of `flat`, without compiling or calling anything."""
+        return self._program(leaves, structure).reads
+
+    def _program(self, leaves: list[Any], structure: Any) -> _Program:
+        last, program = self._last
+        if structure is not last or program is None:
+            key = structure, *[leaf.__class__ if _is_view(leaf) else getattr(leaf, "shape", ()) for leaf in leaves]
+            program = self._programs.get(key)
+            if program is None:
+                program = self._programs[key] = self._trace(leaves, structure)
+            self._last = structure, program
+        return program
 
     @property
     def reads(self) -> frozenset[str]:

@@ -32,5 +32,6 @@ IN_CONTACT_WITH = Predicate(
     name="in_contact_with",
     arguments=("object or agent", "object or agent"),
     evaluate=_evaluate,
+    of_arguments=True,
     aliases=("touching",),
 )

@@ -22,5 +22,6 @@ IN_HAND_OF_AGENT = Predicate(
     name="in_hand_of_agent",
     arguments=("object",),
     evaluate=_evaluate,
+    of_arguments=True,
     aliases=("in_hand_of_robot", "inhandofagent", "inhandofrobot"),
 )

@@ -29,6 +29,7 @@ IN_REACH_OF_AGENT = Predicate(
     name="in_reach_of_agent",
     arguments=("object",),
     evaluate=_evaluate,
+    of_arguments=True,
     aliases=("in_reach_of_robot", "inreachofagent", "inreachofrobot"),
     why=_why,
 )

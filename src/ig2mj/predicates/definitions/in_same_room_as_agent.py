@@ -33,6 +33,7 @@ IN_SAME_ROOM_AS_AGENT = Predicate(
     name="in_same_room_as_agent",
     arguments=("object",),
     evaluate=_evaluate,
+    of_arguments=True,
     aliases=("in_same_room_as_robot", "insameroomasagent", "insameroomasrobot"),
     why=_why,
 )

@@ -22,6 +22,7 @@ INSIDE = Predicate(
     name="inside",
     arguments=("object", "object"),
     evaluate=_evaluate,
+    of_arguments=True,
     aliases=("inside_of", "insideof"),
     queries=_queries,
 )

@@ -41,6 +41,7 @@ NEXT_TO = Predicate(
     name="next_to",
     arguments=("object", "object"),
     evaluate=_evaluate,
+    of_arguments=True,
     aliases=("nextto",),
     queries=_queries,
     why=_why,

@@ -65,6 +65,7 @@ ON_FLOOR = Predicate(
     name="on_floor",
     arguments=("object", "room"),
     evaluate=_evaluate,
+    of_arguments=True,
     aliases=("onfloor",),
     why=_why,
 )

@@ -31,6 +31,7 @@ ON_TOP = Predicate(
     name="on_top",
     arguments=("object", "object"),
     evaluate=_evaluate,
+    of_arguments=True,
     aliases=("ontop", "on_top_of"),
     queries=_queries,
     why=_why,

@@ -25,6 +25,7 @@ OPEN = Predicate(
     name="open",
     arguments=("object",),
     evaluate=_evaluate,
+    of_arguments=True,
     ability="openable",
     why=_why,
 )

@@ -27,6 +27,7 @@ UNDER = Predicate(
     name="under",
     arguments=("object", "object"),
     evaluate=_evaluate,
+    of_arguments=True,
     queries=_queries,
     why=_why,
 )

@@ -49,17 +49,27 @@ def update(
       can_clean: the tool can take this kind of particle now.
       view: physics.
     """
-    tools = model.parameters.tool_object
-    if len(tools) == 0 or len(rows) == 0:
+    if len(model.parameters.tool_object) == 0 or len(rows) == 0:
         return particles
-    touching = _touching(model, view)[:, :, rows] & can_clean[..., None]  # [W, T, R]
-    touching &= jnp.any(particles.alive, axis=-1)[:, None]
+    touching = meeting(model, particles, rows, can_clean, view)
     alive = jax.lax.cond(
         jnp.any(touching),
         lambda: particles.alive & ~_wiped(model, particles, touching, view),
         lambda: particles.alive,
     )
     return dataclasses.replace(particles, alive=alive)
+
+
+def meeting(
+    model: StateModel,
+    particles: Particles,
+    rows: Int[np.ndarray, "R"],
+    can_clean: Bool[Array, "W T"],
+    view: PhysicsView,
+) -> Bool[Array, "W T R"]:
+    """Which tool touches which object that has particles left; arguments as of `update`."""
+    touching = _touching(model, view)[:, :, rows] & can_clean[..., None]
+    return touching & jnp.any(particles.alive, axis=-1)[:, None]
 
 
 def _wiped(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -61,8 +62,12 @@ class Dirt:
 
     def spec(self) -> StateSpec:
         """The state."""
-        return particle_state(self.name, self.ability, self.rows, self._update, aliases=(self.alias,))
+        return particle_state(self.name, self.ability, self.rows, self._update, self._idle, aliases=(self.alias,))
 
     def _update(self, step: EventStep) -> Particles:
         rows = getattr(step.states, self.name)
         return cleaning.update(step.model, rows, self.rows(step.model), self.can_clean(step), step.view)
+
+    def _idle(self, step: EventStep) -> Bool[Array, ""]:
+        rows = getattr(step.states, self.name)
+        return ~jnp.any(cleaning.meeting(step.model, rows, self.rows(step.model), self.can_clean(step), step.view))

@@ -21,12 +21,16 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.definitions.open import is_open
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations.plan import Query
+from ig2mj.states.relations.plan import BOX_SLACK, Query
 from ig2mj.states.relations.relations import Relations
 from ig2mj.states.spec import StateSpec
 
 if TYPE_CHECKING:
     from ig2mj.states.world import ExtendedStates
+
+
+FAR_BEYOND = 0.01
+"""Metres beyond the reach of a source where no rounding can bring an object back within it."""
 
 
 def queries(model: StateModel) -> list[Query]:
@@ -65,6 +69,37 @@ def acts_on(model: StateModel, on: Bool[Array, "W S"], view: PhysicsView, relati
     else:
         inside = jnp.zeros(reached.shape, bool)
     return on[:, None] & jnp.where(p.heat_requires_inside, inside, reached) & p.thermal[:, None]
+
+
+def all_out_of_reach(model: StateModel, view: PhysicsView) -> bool:
+    """On the host: no object with a temperature is anywhere near a source, however distances are rounded.
+
+    No source acts on anything then; false where anything is not finite.
+    """
+    p = model.parameters
+    thermal, boxes, own, links = _places(model)
+    com = np.asarray(view.object_com).take(thermal, 1)[:, :, None]
+    low, high = np.asarray(view.aabb_low).take(boxes, 1), np.asarray(view.aabb_high).take(boxes, 1)
+    low, high = low[:, None] - (BOX_SLACK + FAR_BEYOND), high[:, None] + (BOX_SLACK + FAR_BEYOND)
+    beyond = (com < low) | (com > high)
+    if not (beyond[..., 0] | beyond[..., 1] | beyond[..., 2] | own).all():
+        return False
+    if not len(links):
+        return True
+    offset = np.abs(com - np.asarray(view.link_pos)[:, None, p.heat_link[links]]).max(-1)
+    return bool((offset > p.heat_distance[links] + FAR_BEYOND).all())
+
+
+@functools.lru_cache(maxsize=8)
+def _places(
+    model: StateModel,
+) -> tuple[Int[np.ndarray, "T"], Int[np.ndarray, "C"], Bool[np.ndarray, "T C"], Int[np.ndarray, "N"]]:
+    """Objects with a temperature; those that act on what is inside them; where both are one; sources that act by
+    nearness."""
+    p = model.parameters
+    inside, thermal = p.heat_requires_inside, np.flatnonzero(p.thermal)
+    boxes = np.unique(p.heat_object[inside])
+    return thermal, boxes, thermal[:, None] == boxes, np.flatnonzero(~inside & (p.heat_link >= 0))
 
 
 def _inside_pairs(model: StateModel) -> Int[np.ndarray, "P 2"]:

@@ -106,6 +106,10 @@ def _update(step: EventStep) -> EventStep:
     return dataclasses.replace(step, states=states, cut_now=cut_now, swap=swap)
 
 
+def _idle(step: EventStep) -> Bool[Array, ""]:
+    return ~jnp.any(cut(step.model, step.states.sliced, step.view))
+
+
 SPEC = StateSpec.of_objects(
-    "sliced", bool, False, _update, settable=False, abilities=("sliceable",), aliases=("sliced_state",)
+    "sliced", bool, False, _update, settable=False, idle=_idle, abilities=("sliceable",), aliases=("sliced_state",)
 )

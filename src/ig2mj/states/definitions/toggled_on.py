@@ -71,6 +71,11 @@ def _update(step: EventStep) -> EventStep:
     return step.having(toggled_on=on, press_count=count)
 
 
+def _idle(step: EventStep) -> Bool[Array, ""]:
+    on, count = update(step.model, step.states.toggled_on, step.states.press_count, step.view)
+    return jnp.all(on == step.states.toggled_on) & jnp.all(count == step.states.press_count)
+
+
 SPEC = StateSpec(
     name="toggled_on",
     get=lambda model, states, view, o, w: bool(np.asarray(states.toggled_on)[w, o]),
@@ -79,6 +84,7 @@ SPEC = StateSpec(
     fields={"toggled_on": Bool[Array, "W O"], "press_count": Int[Array, "W O"]},
     initial=_initial,
     update=_update,
+    idle=_idle,
     inherit=copied("toggled_on", "press_count"),
     # The second keys are those of scenes converted by early versions.
     from_manifest=numbers(

@@ -134,16 +134,20 @@ def update(
     else:
         moved, contacts = _fall_in_turns(model, water, poses)
     tap = jnp.asarray(view.link_pos)[:, parameters.water_link] - np.array([0.0, 0.0, SPAWN_BELOW], np.float32)
-    switched = model.parameters.has("toggleable")[parameters.water_object]
     updated = WaterDrops(
         active=moved.active | emitting,
         pos=jnp.where(emitting[..., None], tap[:, :, None], moved.pos),
         speed=jnp.where(emitting, 0.0, moved.speed),
         age=jnp.where(emitting | ~moved.active, 0, jnp.minimum(moved.age, OLDEST - 1) + 1),
         waited=waited,
-        running=jnp.where(switched, toggled_on[:, parameters.water_object], True),
+        running=_switched_on(model, toggled_on),
     )
     return updated, contacts
+
+
+def _switched_on(model: StateModel, toggled_on: Bool[Array, "W O"]) -> Bool[Array, "W C"]:
+    sources = model.parameters.water_object
+    return jnp.where(model.parameters.has("toggleable")[sources], toggled_on[:, sources], True)
 
 
 def _emission(model: StateModel, water: WaterDrops) -> tuple[Bool[Array, "W C N"], Int[Array, "W C"]]:
@@ -243,6 +247,15 @@ def _update(step: EventStep) -> EventStep:
     return dataclasses.replace(step.having(water=water), drops=drops)
 
 
+def _idle(step: EventStep) -> Bool[Array, ""]:
+    """No drop is out, and no source runs or begins to."""
+    water, model = step.states.water, step.model
+    if len(model.parameters.water_object) == 0:
+        return jnp.array(True)
+    running = water.running | _switched_on(model, step.states.toggled_on)
+    return ~jnp.any(water.active) & ~jnp.any(running) & jnp.all(water.age == 0)
+
+
 def _get(model: StateModel, states: ExtendedStates, view: PhysicsView, obj: int, world: int) -> int:
     mine = np.flatnonzero(model.parameters.water_object == obj)
     return int(np.asarray(states.water.active)[world, mine].sum()) if len(mine) else 0
@@ -270,6 +283,7 @@ SPEC = StateSpec(
     fields={"water": WaterDrops},
     initial=lambda model: {"water": no_drops(1, len(model.parameters.water_object))},
     update=_update,
+    idle=_idle,
     inherit=nothing_inherited,  # drops belong to their source
     from_manifest=_from_manifest,
 )

@@ -44,6 +44,11 @@ def _update(step: EventStep) -> EventStep:
     return step.having(wetness=update(step.model, step.states.wetness, step.drops))
 
 
+def _idle(step: EventStep) -> Bool[Array, ""]:
+    wetness = step.states.wetness
+    return jnp.all(update(step.model, wetness, step.drops) == wetness)
+
+
 SPEC = StateSpec.of_objects(
-    "wetness", float, 0.0, _update, unit="droplets", abilities=("soakable",), aliases=("wetness_level",)
+    "wetness", float, 0.0, _update, idle=_idle, unit="droplets", abilities=("soakable",), aliases=("wetness_level",)
 )
