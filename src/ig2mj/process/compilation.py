@@ -62,7 +62,9 @@ def report_xla_compilation() -> None:
 PROGRAMS = {
     "rules_fn": "the rules of states",
     "heat_fn": "the rules of temperatures",
-    "status_fn": "the status of a goal",
+    "idle_fn": "the check whether states change",
+    "acts_fn": "the reach of heat sources",
+    "statuses_fn": "the status of a goal",
     "run": "a predicate's question",
     "evaluate_fn": "rewards and observations",
     "evaluate_first_fn": "observations after a reset",

@@ -109,7 +109,7 @@ class Agent:
         for name in arguments:
             if name not in tables.room_names:
                 self.rung.domain.index(name)
-        if self._simulation._grasping is None and primitive not in ("navigate_to", "toggle_on", "toggle_off"):
+        if self._simulation.core.grasping is None and primitive not in ("navigate_to", "toggle_on", "toggle_off"):
             raise PlanningError(
                 f"'{primitive}' needs hands that take hold of things: Simulation(..., grasping='assisted')"
             )

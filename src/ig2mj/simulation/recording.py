@@ -26,6 +26,7 @@ from ig2mj.engine.base import Physics
 from ig2mj.errors import EngineError, InputError
 from ig2mj.process import entry_point
 from ig2mj.simulation.saving import SavedWorld, put_world
+from ig2mj.worlds.hands import Held
 
 if TYPE_CHECKING:
     from ig2mj.simulation.simulation import Simulation
@@ -83,14 +84,15 @@ class SimulationRecorder:
     def begin(self) -> None:
         """To be called before steps: where the world is another than after the last one, a new run begins."""
         simulation = self._simulation
-        frame = self._frame(simulation.physics, simulation._states_or_none, simulation._steps)
+        world = simulation._batch.world
+        frame = self._frame(simulation.physics, world.states, int(world.step[0]), simulation._batch.grasps)
         if self._last is None or not all(map(_same, self._flat(self._last), self._flat(frame))):
             self.writer.begin({0: {}}, frame[0], frame[1])
             self._last = frame
 
-    def add(self, physics: Physics, states: Any, steps: int) -> None:
+    def add(self, physics: Physics, states: Any, steps: int, held: Held) -> None:
         """The frame after a control step, which is the `steps`-th."""
-        self._last = self._frame(physics, states, steps)
+        self._last = self._frame(physics, states, steps, held)
         self.writer.add(self._last[0], self._last[1], [])
 
     def close(self) -> None:
@@ -108,21 +110,21 @@ class SimulationRecorder:
     def _flat(self, frame: list[Any]) -> list[Any]:
         return [*(piece for own in frame[0] for piece in own), *(frame[1][k] for k in self._compared)]
 
-    def _frame(self, physics: Physics, states: Any, steps: int) -> list[Any]:
+    def _frame(self, physics: Physics, states: Any, steps: int, held: Held) -> list[Any]:
         own, batched = self._engine.frame(physics, [0])
-        return [own, [*batched, *self._engine.kept(jax.tree.leaves(_besides(self._simulation, states, steps)))]]
+        return [own, [*batched, *self._engine.kept(jax.tree.leaves(_besides(self._simulation, states, steps, held)))]]
 
 
-def _besides(simulation: Simulation, states: Any, steps: int) -> tuple[Any, ...]:
+def _besides(simulation: Simulation, states: Any, steps: int, held: Held) -> tuple[Any, ...]:
     """What of a `SavedWorld` is not physics; every array with a world axis."""
-    robots = simulation.robots
-    key = np.asarray(jax.random.key_data(simulation._key))[None]
-    return states, key, np.array([steps]), robots.controllers, robots.held
+    batch, kept = simulation._batch, None if simulation.core.rules is None else states
+    return kept, batch.world.key, np.array([steps]), batch.controllers, held
 
 
 def _world(simulation: Simulation) -> SavedWorld:
     physics = simulation.engine.snapshot(simulation.physics)
-    states, key, step, controllers, held = _besides(simulation, simulation._states_or_none, simulation._steps)
+    world, held = simulation._batch.world, simulation._batch.grasps
+    states, key, step, controllers, held = _besides(simulation, world.states, int(world.step[0]), held)
     return SavedWorld(physics, states, key[0], step, controllers, held)
 
 
@@ -140,7 +142,7 @@ def _leaves(simulation: Simulation) -> list[np.ndarray]:
 
 
 def _origin(simulation: Simulation, version: int = FORMAT_VERSION) -> dict[str, Any]:
-    engine, grasping = simulation.engine, simulation._grasping
+    engine, grasping = simulation.engine, simulation.core.grasping
     own = {
         "kind": KIND,
         "engine": engine.name,
@@ -181,7 +183,7 @@ def _replayed(simulation: Simulation, recording: Recording) -> Replayed:
             if k == 0:
                 put_world(simulation, saved)
             else:
-                simulation.robots.controllers = saved.controllers
+                simulation._put(controllers=saved.controllers)
                 simulation.step(np.asarray(saved.physics.ctrl)[0])
             difference = first_difference(labels, run.name, k, names, rows, _leaves(simulation), lacking)
             if difference is not None:

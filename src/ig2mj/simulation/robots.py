@@ -1,18 +1,15 @@
-"""`RobotsOfWorld`: the robots of a `Simulation`, with what their controllers remember and what their hands hold."""
+"""`RobotsOfWorld`: the robots of a `Simulation`, by names."""
 
 from __future__ import annotations
 
-import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
-from ig2mj.engine.base import Write
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import ActionError, EngineError, UnknownNameError
 from ig2mj.process import entry_point
-from ig2mj.sampling.row import Row
 from ig2mj.simulation.agent import Agent
 from ig2mj.worlds.hands import Held
 
@@ -22,26 +19,24 @@ if TYPE_CHECKING:
 
 @entry_point
 class RobotsOfWorld:
-    """Robots of one world.
-
-    Attributes:
-      controllers: what each controller remembers. held: what hands hold, None where by friction alone.
-    """
+    """Robots of one world. What they remember and hold is part of the simulation's batch."""
 
     def __init__(self, simulation: Simulation):
-        """Controllers at their start; hands hold what the world's constraints say."""
+        """Those of the simulation's scene."""
         self._simulation, self._core = simulation, simulation.core
         engine = simulation.engine
         self._steps = max(1, round(ACTION_PERIOD / (engine.substeps * engine.timestep)))
-        self.controllers: tuple[Any, ...] = self._core.controls.first()
-        self.held: Held = self._core.hands.read(simulation.physics)
         self._agents: dict[str, Agent] = {}
 
-    def of(self, simulation: Simulation) -> RobotsOfWorld:
-        """The same robots in a copy of the simulation."""
-        new = copy.copy(self)
-        new._simulation, new._agents = simulation, {}
-        return new
+    @property
+    def controllers(self) -> tuple[Any, ...]:
+        """What each controller remembers."""
+        return self._simulation._batch.controllers
+
+    @property
+    def held(self) -> Held:
+        """What hands hold, None where by friction alone."""
+        return self._simulation._batch.grasps
 
     def __getitem__(self, name: str) -> Agent:
         """A robot by its name. Raises UnknownNameError; PlanningError: its motion cannot be planned."""
@@ -99,14 +94,11 @@ class RobotsOfWorld:
         if not np.isfinite(row).all():
             raise ActionError("an action is of finite numbers")
         row = np.clip(row, self.action_low, self.action_high).astype(np.float32)
-        view = self._simulation.view
+        simulation = self._simulation
         for _ in range(count):
-            simulation = self._simulation
-            ctrl, self.controllers = self._core.controls.act(row[None], view, self.controllers)
-            resets = self._core.hand_resets
-            simulation.physics = resets.act(simulation.physics, view, row[None], self.controllers)
-            view = self._simulation.step(np.asarray(ctrl, np.float64)[0], self._steps)
-        return view
+            simulation.batch, ctrl = self._core.act(simulation.batch, row[None])
+            simulation.step(np.asarray(ctrl, np.float64)[0], self._steps)
+        return simulation.view
 
     @property
     def holding(self) -> dict[str, str | None]:
@@ -117,26 +109,3 @@ class RobotsOfWorld:
             for hand, body, on in zip(hands, np.asarray(self.held.body)[0], np.asarray(self.held.held)[0], strict=True):
                 hands[hand] = tables.object_names[tables.graspable_object[body]] if on else None
         return hands
-
-
-def remembered(simulation: Simulation) -> tuple[Any, ...]:
-    """What the controllers of a simulation remember, where its view depends on that; else nothing."""
-    if not simulation.scene.agents or not simulation.core.cameras.moving:
-        return ()
-    return simulation.core.controls.first() if simulation._robots is None else simulation._robots.controllers
-
-
-def after_write(simulation: Simulation, write: Write) -> PhysicsView:
-    """The view after a write to a simulation's physics, or a cut; hands let go of what it moved."""
-    robots, view = simulation._robots, simulation.view
-    if robots is not None:
-        robots.held = simulation.core.hands.after_write(simulation.physics, view, robots.held, write)
-    return view
-
-
-def put_row(simulation: Simulation, row: Row) -> None:
-    """The world becomes a sampled one: hands hold what it brings along; controllers remember what they did."""
-    simulation.physics, simulation._states = simulation.engine.load(simulation.physics, row.physics), row.states
-    robots = simulation._robots
-    if robots is not None:
-        robots.held = simulation.core.hands.after_load(simulation.physics, robots.held)

@@ -46,14 +46,14 @@ class SavedWorld:
 
 def everything(simulation: Simulation) -> SavedWorld:
     """What is to be saved of a simulation."""
-    world = simulation.world
+    batch, world = simulation._batch, simulation.world
     return SavedWorld(
         physics=jax.tree.map(lambda leaf: np.asarray(leaf)[None], simulation.engine.export(simulation.physics, 0)),
         states=world.states,
         key=np.asarray(world.key)[0],
         step=np.asarray(world.step, int),
-        controllers=simulation.robots.controllers,
-        held=simulation.robots.held,
+        controllers=batch.controllers,
+        held=batch.grasps,
     )
 
 
@@ -99,8 +99,11 @@ def load_world(file: str | os.PathLike, like: SavedWorld, scene: Scene, initial:
 def put_world(simulation: Simulation, found: SavedWorld) -> PhysicsView:
     """The simulation's world becomes another one of its scene; its view."""
     simulation.physics = simulation.engine.load(simulation.physics, found.physics)
-    simulation._states = jax.tree.map(jnp.asarray, found.states)
-    simulation._key = jax.random.wrap_key_data(jnp.asarray(found.key))
-    simulation._steps = int(found.step[0])
-    simulation.robots.controllers, simulation.robots.held = found.controllers, found.held
+    simulation._put(
+        states=jax.tree.map(jnp.asarray, found.states),
+        key=np.asarray(found.key)[None],
+        step=np.asarray(found.step, np.int32),
+        controllers=found.controllers,
+        grasps=found.held,
+    )
     return simulation.view

@@ -5,17 +5,20 @@
     simulation.step(count=300)                       # ten seconds
     simulation.predicate("cooked", "fish_0")
 
-A core with a single world steps it (`ig2mj.worlds.core`); everything here only adds names to that.
+A core with a single world steps it (`ig2mj.worlds.core`), and all that changes is a `Batch` of one world
+(`simulation.batch`); everything here only adds names to that.
 """
 
 from __future__ import annotations
 
 import copy
+import dataclasses
 import functools
 import os
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 
@@ -34,18 +37,21 @@ from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.process.deprecation import warn_renamed
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.placement import Budget
+from ig2mj.sampling.row import Row
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Objects, Scene, scene_with
 from ig2mj.simulation import images
 from ig2mj.simulation.agent import Agent, only_agent
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
 from ig2mj.simulation.recording import Recorded
-from ig2mj.simulation.robots import RobotsOfWorld, after_write, put_row, remembered
+from ig2mj.simulation.robots import RobotsOfWorld
 from ig2mj.simulation.sampling import WorldSampler
 from ig2mj.simulation.saving import everything, load_world, put_world, save_world
 from ig2mj.states.model import DEFAULTS, StateModel
 from ig2mj.states.options import StateOptions
 from ig2mj.states.world import ExtendedStates, WorldState
+from ig2mj.worlds import guards
+from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.plugin_states import completed
 from ig2mj.worlds.rules import Rules
@@ -57,7 +63,7 @@ class Simulation(Recorded):
     """One world of a scene on any engine.
 
     Attributes:
-      scene: the household. engine: what steps physics. physics: the engine's state; use what the methods give instead.
+      scene: the household. engine: what steps physics. core: what steps this world.
       state_options: how extended states behave; None where only physics is stepped.
       last_sampling: why candidates of the last `set_predicate` were turned down: {reason: how often}.
     """
@@ -89,19 +95,37 @@ class Simulation(Recorded):
         if self.engine.num_worlds != 1:
             raise EngineError(f"a Simulation is one world, and the engine has {self.engine.num_worlds}")
         self.state_options = states
+        rules = None if states is None else Rules.of_scene(self.scene, states)
+        controllers, rule = controllers_of(self.scene, ACTION_PERIOD), grasping_of(self.engine, grasping)
+        self.core = Core(self.engine, rules, None, controllers, rule, True)
         self._seed = seed
-        self.physics = self.engine.reset()
-        self._initial = self.engine.export(self.physics, 0)
+        physics = self.engine.reset()
+        self._initial = self.engine.export(physics, 0)
         self.last_sampling: dict[str, int] = {}
-        self._grasping = grasping_of(self.engine, grasping)
-        self._begin()
-
-    def _begin(self) -> None:
-        """States, clock and random key at their start; states are made at the first question about them."""
-        self._states: ExtendedStates | None = None
-        self._key = jax.random.key(self._seed)
-        self._steps = 0
         self._robots: RobotsOfWorld | None = None
+        self._batch = self._first(physics)
+
+    def _first(self, physics: Physics) -> Batch:
+        """The batch at the start of an episode with this physics."""
+        core, nothing = self.core, np.zeros(1, np.int32)
+        world = WorldState(
+            physics=physics,
+            view=self.engine.view(physics),
+            states=(core.rules or Rules.of_scene(self.scene)).initial,  # physics alone leaves them as they are
+            key=np.asarray(jax.random.key_data(jax.random.key(self._seed)))[None],
+            step=nothing,
+            time=np.zeros(1, np.float32),
+        )
+        return Batch(
+            world=world,
+            controllers=core.controls.first(),
+            grasps=core.hands.read(physics),
+            number=nothing,
+            seed=np.asarray(self._seed, np.int32),
+            episode=nothing,
+            flags=nothing,
+            troubles=np.zeros((1, len(guards.Flag)), np.int32),
+        )
 
     def __repr__(self) -> str:
         return f"Simulation('{self.scene.name}', engine '{self.engine.name}')"
@@ -126,20 +150,48 @@ class Simulation(Recorded):
         simulation = cls(scene, **options)
         simulation.physics = simulation.engine.load(simulation.physics, snapshot)
         simulation._initial = simulation.engine.export(simulation.physics, 0)
-        simulation._states = states if states is None else completed(states, simulation._rules.initial)
+        if states is not None:
+            simulation._put(states=completed(states, simulation._rules.initial))
         return simulation
+
+    @property
+    def batch(self) -> Batch:
+        """This world as a batch of one, for `core` and for functions of batches.
+
+            simulation.batch, status = simulation.core.step(simulation.batch)
+
+        Steps of a simulation raise no flags: a world that is lost is an error.
+        """
+        return dataclasses.replace(self._batch, world=self._world)
+
+    @batch.setter
+    def batch(self, batch: Batch) -> None:
+        self._batch = batch
+
+    def _put_row(self, row: Row) -> None:
+        """The world becomes a sampled one: hands hold what it brings along; controllers remember what they did."""
+        self.physics = self.engine.load(self.physics, row.physics)
+        self._put(states=row.states)
+
+    def _put(self, *, controllers: Any = None, grasps: Any = None, **fields: Any) -> None:
+        """Replaces fields of the world, and what controllers remember and hands hold where it is given."""
+        world = dataclasses.replace(self._batch.world, **fields)
+        own = {"controllers": controllers, "grasps": grasps}
+        given = {name: value for name, value in own.items() if value is not None}
+        self._batch = dataclasses.replace(self._batch, world=world, **given)
 
     @property
     def physics(self) -> Physics:
         """The engine's state of this world as it is now, also after a step that Ctrl-C or an error ended.
 
-        A handle taken from here is stale after the next step.
+        A handle taken from here is stale after the next step. Another one may be assigned, of the same engine; hands
+        then hold what its constraints say.
         """
-        return self.engine.current(self._physics)
+        return self.engine.current(self._batch.world.physics)
 
     @physics.setter
     def physics(self, physics: Physics) -> None:
-        self._physics = physics
+        self._put(physics=physics, grasps=self.core.hands.after_load(physics, self._batch.grasps))
 
     @property
     def time(self) -> float:
@@ -149,8 +201,7 @@ class Simulation(Recorded):
     @property
     def view(self) -> PhysicsView:
         """Everything that states and predicates know of physics; world axis of length 1."""
-        view = self.engine.view(self.physics)
-        return self.core.cameras.placed(view, remembered(self)) if self.scene.agents else view
+        return self.core.cameras.placed(self.engine.view(self.physics), self._batch.controllers)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -161,12 +212,6 @@ class Simulation(Recorded):
     def data(self) -> mujoco.MjData:
         """MuJoCo's data of this world: live on the native engine (call `forward` after changing it), else a copy."""
         return self.engine.to_mujoco(self.physics, 0)[1]
-
-    @functools.cached_property
-    def core(self) -> Core:
-        """What steps this world."""
-        rules = None if self.state_options is None else Rules.of_scene(self.scene, self.state_options)
-        return Core(self.engine, rules, None, controllers_of(self.scene, ACTION_PERIOD), self._grasping, True)
 
     @property
     def robots(self) -> RobotsOfWorld:
@@ -198,32 +243,27 @@ class Simulation(Recorded):
     @property
     def states(self) -> ExtendedStates:
         """Extended states; world axis of length 1."""
-        if self._states is None:
-            self._states = self._rules.initial
-        return self._states
-
-    @property
-    def _states_or_none(self) -> Any:
-        return self._states if self._states is not None or self.state_options is None else self.states
+        _ = self._rules
+        return self._batch.world.states
 
     @property
     def world(self) -> WorldState:
         """Everything of this world, as compiled expressions and environments take it."""
-        seconds = self._steps * self.engine.substeps * self.engine.timestep
-        return WorldState(
-            physics=self.physics,
-            view=self.view,
-            states=self.states,
-            key=np.asarray(jax.random.key_data(self._key))[None],
-            step=np.array([self._steps], np.int32),
-            time=np.array([seconds], np.float32),
+        _ = self._rules
+        return self._world
+
+    @property
+    def _world(self) -> WorldState:
+        seconds = self._batch.world.step * (self.engine.substeps * self.engine.timestep)
+        return dataclasses.replace(
+            self._batch.world, physics=self.physics, view=self.view, time=np.asarray(seconds, np.float32)
         )
 
     # Time.
 
     def prepare(self) -> None:
         """Compiles what the first step needs, without taking it."""
-        self.core.prepare(self.physics, self._states_or_none)
+        self.core.prepare(self.physics, self._batch.world.states)
 
     def start(self, seed: int = 0) -> PhysicsView:
         """The scene's initial state, with another seed of what `set_state` samples at random."""
@@ -234,14 +274,13 @@ class Simulation(Recorded):
         """An independent simulation of the same world, which continues as this one does."""
         new = copy.copy(self)
         new._recorder, new.last_sampling = None, dict(self.last_sampling)
-        new.physics = self.engine.fork(self.physics)
-        new._robots = None if self._robots is None else self._robots.of(new)
+        new._robots = None
+        new._put(physics=self.engine.fork(self.physics))
         return new
 
     def reset(self) -> PhysicsView:
         """Back to the scene's initial state."""
-        self.physics = self.engine.load(self.physics, self._initial)
-        self._begin()
+        self._robots, self._batch = None, self._first(self.engine.load(self.physics, self._initial))
         return self.view
 
     def step(self, ctrl: Vector | None = None, count: int = 1) -> PhysicsView:
@@ -263,23 +302,23 @@ class Simulation(Recorded):
             )
         row, view = None if row is None else row[None], self.view
         step, rest = self.core.physics_step, self.core.after_physics  # an interrupted step keeps its physics
-        physics, states, done = self.physics, self._states_or_none, 0
-        robots = self.robots if self._grasping is not None else None
-        controllers, grasps = (remembered(self), None) if robots is None else (robots.controllers, robots.held)
+        batch, physics, done = self._batch, self.physics, 0
+        world, controllers, grasps = batch.world, batch.controllers, batch.grasps
+        states, before = world.states, int(world.step[0])
         if (recorder := self._recorder) is not None:
             recorder.begin()
         try:
             for done in range(1, count + 1):
                 physics, view = step(physics, row)
                 physics, view, states, _, grasps = rest(physics, view, states, controllers, grasps)
-                if robots is not None:
-                    robots.held = grasps
                 row = None
                 if recorder is not None:
-                    recorder.add(physics, states, self._steps + done)
+                    recorder.add(physics, states, before + done, grasps)
         finally:
-            self.physics, self._states = physics, states
-            self._steps += done
+            after = WorldState(
+                physics=physics, view=view, states=states, key=world.key, step=world.step + done, time=world.time
+            )
+            self._batch = dataclasses.replace(batch, world=after, grasps=grasps)
         return view
 
     def forward(self) -> PhysicsView:
@@ -287,8 +326,14 @@ class Simulation(Recorded):
         return self._write(Write())
 
     def _write(self, write: Write) -> PhysicsView:
-        self.physics = self.engine.write(self.physics, write)
-        return after_write(self, write)
+        self._put(physics=self.engine.write(self.physics, write))
+        return self._written(write)
+
+    def _written(self, write: Write) -> PhysicsView:
+        """The view after a write to physics, or a cut; hands let go of what it moved."""
+        view = self.view
+        self._put(grasps=self.core.hands.after_write(self.physics, view, self._batch.grasps, write))
+        return view
 
     # Objects and joints.
 
@@ -355,15 +400,15 @@ class Simulation(Recorded):
         Raises:
           UnknownNameError, AbilityError: as for `state`. StateError: it cannot be set, or a door would shove something.
         """
-        self._key, key = jax.random.split(self._key)
-        change = set_by_name(self.state_model, self.states, self.view, name, object_name, value, key)
-        self._states = change.states
+        key, own = jax.random.split(jax.random.wrap_key_data(jnp.asarray(self._batch.world.key[0])))
+        change = set_by_name(self.state_model, self.states, self.view, name, object_name, value, own)
+        self._put(states=change.states, key=np.asarray(jax.random.key_data(key))[None])
         if change.swap is not None:
-            self.physics, _ = self.core.teleport(self.physics, self.view, change.swap)
-            after_write(self, Write())
+            self._put(physics=self.core.teleport(self.physics, self.view, change.swap)[0])
+            self._written(Write())
         if change.joints is not None:
             now = self.engine.export(self.physics, 0)
-            self._write(self._sampler.write_of_joints(change, now, self.states, object_name, bool(value), key))
+            self._write(self._sampler.write_of_joints(change, now, self.states, object_name, bool(value), own))
 
     def set_predicate(self, name: str, *arguments: str, value: bool = True, seed: int = 0) -> bool:
         """Makes a predicate true or false by sampling, as table A.5 of the paper says, and lets the world come to rest.
@@ -385,7 +430,7 @@ class Simulation(Recorded):
         row = self._sampler.sample(condition, now, self.states, seed, Budget())
         self.last_sampling = dict(self._sampler.rejected)
         if row is not None:
-            put_row(self, row)
+            self._put_row(row)
         return row is not None
 
     @functools.cached_property

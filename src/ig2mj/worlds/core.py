@@ -134,17 +134,17 @@ class Core:
     def step_fn(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
         """`step`, not compiled."""
         if self.controllers and action is not None:
-            batch, action = self._acted(batch, action)
+            batch, action = self.act(batch, action)
         return self._control_step(batch, action)
 
     def repeat_action_fn(self, batch: Batch, action: Float[Array, "W n"], steps: int) -> tuple[Batch, GoalStatus]:
         """`steps` control steps of one action, not compiled: controllers act once, and their controls are kept."""
         if self.controllers:
-            batch, action = self._acted(batch, action)
+            batch, action = self.act(batch, action)
         return self.engine.repeat(lambda batch: self._control_step(batch, action), batch, steps)
 
-    def _acted(self, batch: Batch, action: Float[Array, "W n"]) -> tuple[Batch, Float[Array, "W nu"]]:
-        """The controllers' controls for an action."""
+    def act(self, batch: Batch, action: Float[Array, "W n"]) -> tuple[Batch, Float[Array, "W nu"]]:
+        """The controllers' part of a step: the batch after it, and MuJoCo's controls for an action; not compiled."""
         world = batch.world
         ctrl, controllers = self.controls.act(action, world.view, batch.controllers)
         physics = self.hand_resets.act(world.physics, world.view, action, controllers)
