@@ -1,6 +1,6 @@
 """Counts CUDA graphs that Warp captures and programs that XLA compiles: each costs a processor up to a second.
 
-`Moves` also tells which arrays lay elsewhere, for which Warp captures a graph anew."""
+`Moves` also tells which arrays lay elsewhere, for which Warp captures a graph again."""
 
 from __future__ import annotations
 

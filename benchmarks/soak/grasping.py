@@ -7,7 +7,7 @@ The robot of an environment moves both hands, fingers and its body at random, at
 along each axis; a new action in one of fifteen control steps. With `sticky` hands close and open at random and take
 whatever they touch, with `mitten` they stick to the activity's first object. `--task-actions`: only what an action of
 the environment moves. Worlds that are flagged (`soak_watch`: overflow, not finite, fallen, outside, too fast) count
-once, by the object's name and by who held it when, and begin anew, as do all after `EPISODE` control steps. Energies:
+once, by the object's name and by who held it when, and begin again, as do all after `EPISODE` control steps. Energies:
 `soak_energy`. A world-step is a physics step of one world (1/120 s). A row with all counts so far is printed, and
 added to `--rows`, every `REPORT` seconds; the last one of a mode has `"done": true`.
 """
@@ -49,7 +49,7 @@ EPISODE = 600
 """Control steps after which a world starts afresh in any case: the 20 s of an activity."""
 
 PERIOD = 1 / 30
-"""Seconds of a control step, in which the robot acts anew: what happens in each of them is looked at."""
+"""Seconds of a control step, in which the robot acts once; each is examined."""
 
 NEW_ACTION = 1 / 15
 """Chance of a new action in a control step."""
@@ -144,7 +144,7 @@ class Run:
         self.scale = scales(env)
         self._resets = np.array([name.endswith("_reset") for name in env.action_map.names])
         self.lasting = STEPS * engine.substeps * args.worlds
-        # One program with donated arrays: Warp captures its graphs anew wherever arrays have moved, and keeps them all.
+        # One program with donated arrays: Warp captures its graphs again where arrays have moved, and keeps them all.
         self.many = jax.jit(self._steps, donate_argnums=0) if engine.pure else self._steps
         self._draw = jax.jit(self._actions)
         self._look = jax.jit(self._looked)

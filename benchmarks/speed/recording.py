@@ -7,7 +7,7 @@ Two environments take the same actions from the same start in lockstep, one reco
 steps and the other in even ones: physics does the same work bit for bit, and what other programs on the machine take
 away (caches, clock) it takes from both alike. Processor time is that of all threads of the process, compression and
 writing included. A turn is as many steps as are written at once; the share is that of the sums over a turn, of which
-the median over turns is given, with the 95 % interval that drawing turns anew gives it. `ms` are medians of steps; what
+the median over turns is given, with its 95 % interval (turns resampled). `ms` are medians of steps; what
 writing adds to the last step of a turn is apart.
 Sizes are those of files with a whole number of
 flushes, at 10 frames a second (agent steps) and at 30 (`period=1 / 30`, as people drive), for random actions that are

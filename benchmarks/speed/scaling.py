@@ -51,7 +51,7 @@ Case = Literal["made_60", "birch_pictures", "learner"]
 Way = Literal["processes", "moving", "graphs", "together"]
 
 GRAPHS = "--xla_gpu_enable_command_buffer=+COLLECTIVES"
-"""XLA leaves collectives out of its CUDA graphs, which then end before and begin anew after each."""
+"""XLA leaves collectives out of its CUDA graphs, which then end before each and begin again after it."""
 
 PROFILED = "--xla_enable_command_buffers_during_profiling=true"
 """Without it XLA launches each kernel by itself while a profiler looks on, which is another program."""

@@ -56,7 +56,7 @@ class Args:
     rest_steps: int = 150
     """Steps before anything is timed."""
     episode: int = 90
-    """Steps of the hand's motion before it starts anew."""
+    """Steps of the hand's motion before it starts again."""
     rounds: int = 9
     """Blocks of each kind."""
     seconds: float = 0.15

@@ -27,11 +27,11 @@ class NamePool:
     def __init__(self) -> None:
         self._taken: set[str] = set()
 
-    def take(self, wanted: str) -> str:
-        """`wanted`, or `wanted` with `__2`, `__3`, ... where that is taken."""
-        name, count = wanted, 1
+    def take(self, base: str) -> str:
+        """`base`, or `base` with `__2`, `__3`, ... where that is taken."""
+        name, count = base, 1
         while name in self._taken:
             count += 1
-            name = f"{wanted}__{count}"
+            name = f"{base}__{count}"
         self._taken.add(name)
         return name

@@ -121,9 +121,9 @@ def recut_to_budget(
     best = keep_to_budget(hulls, others, few, most, options.max_volume_error, reference)
     source: HullPieceSource = "merged"
     if best.needed > len(best.pieces) and reference is None and most > few:  # fewer than few is the user's own wish
-        anew = _recut(hulls, others, most, options)
-        if anew is not None and (anew.open, -anew.volume_error) > (best.open, -best.volume_error):
-            best, source = anew, "recut"
+        recut = _recut(hulls, others, most, options)
+        if recut is not None and (recut.open, -recut.volume_error) > (best.open, -best.volume_error):
+            best, source = recut, "recut"
     if best.volume_error > options.max_volume_error or not best.open:
         closed = "" if best.open else " and close an opening"
         warnings.append(

@@ -127,8 +127,8 @@ def convert_job(root: str, name: str, common: Mapping[str, Any], chosen: Mapping
     kind, *rest = name.split("/")
     own = chosen if kind == "scenes" else {}
     options = dataclasses.replace(options_of(Common(**common), **own), timed=False)
-    with tempfile.TemporaryDirectory(prefix="ig2mj-") as beside:
-        folder = pathlib.Path(beside) / "out"
+    with tempfile.TemporaryDirectory(prefix="ig2mj-") as scratch:
+        folder = pathlib.Path(scratch) / "out"
         if kind == "scenes":
             convert_scene(root, rest[0], folder, options=options)
         else:
@@ -158,13 +158,13 @@ def packed_folder(folder: pathlib.Path) -> bytes:
 def put_folder(target: pathlib.Path, packed: bytes) -> None:
     """Unpacks a folder under a temporary name, and renames it when it is complete. Raises OSError."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside = unfinished(target)
+    unpacked = unfinished(target)
     try:
         with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
-            archive.extractall(beside, filter="data")
+            archive.extractall(unpacked, filter="data")
         if target.exists():
             shutil.rmtree(target)
-        beside.replace(target)
+        unpacked.replace(target)
     except OSError:
-        shutil.rmtree(beside, ignore_errors=True)
+        shutil.rmtree(unpacked, ignore_errors=True)
         raise

@@ -71,7 +71,7 @@ def run(
     return _keep([(chosen, split)], count, jobs, force, out)
 
 
-def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, force: bool, out: pathlib.Path | None) -> int:
+def _keep(pools: list[tuple[Task, str]], count: int, jobs: int, force: bool, out: pathlib.Path | None) -> int:
     """Samples missing pools in parallel; 1 if rows of one differ from those that ship."""
     import concurrent.futures
     import contextlib
@@ -112,9 +112,9 @@ def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, force: bool, ou
                 f"row {different[0]}: another kind of processor, or another sampler. `ig2mj.make` takes those that ship"
             ), True
 
-        threads = stack.enter_context(concurrent.futures.ThreadPoolExecutor(1 if jobs == 1 else len(wanted)))
+        threads = stack.enter_context(concurrent.futures.ThreadPoolExecutor(1 if jobs == 1 else len(pools)))
         status = 0
-        for text, differs in threads.map(lambda pair: make(*pair), wanted):
+        for text, differs in threads.map(lambda pair: make(*pair), pools):
             print(text, flush=True)
             status |= int(differs)
     return status

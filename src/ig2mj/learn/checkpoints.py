@@ -162,14 +162,14 @@ def _checkpointer() -> Any:
 def _check_shapes(metadata: Any, expected: Mapping[str, np.ndarray]) -> None:
     """Raises ValueError where a checkpoint's arrays are others than expected: orbax unpacks whatever there is."""
     found = dict(metadata.item_metadata.tree)
-    for name, wanted in expected.items():
+    for name, like in expected.items():
         if name not in found:
             raise ValueError(f"{name} is missing")
         shape, dtype = tuple(found[name].shape), np.dtype(found[name].dtype)
-        if shape != wanted.shape or not np.can_cast(dtype, wanted.dtype, "same_kind"):
-            raise ValueError(f"{name} is {dtype}{list(shape)}, and {wanted.dtype}{list(wanted.shape)} is expected")
+        if shape != like.shape or not np.can_cast(dtype, like.dtype, "same_kind"):
+            raise ValueError(f"{name} is {dtype}{list(shape)}, and {like.dtype}{list(like.shape)} is expected")
         chunk = getattr(found[name].storage, "chunk_shape", None) or shape
-        if math.prod(chunk) > max(wanted.size, 1):
+        if math.prod(chunk) > max(like.size, 1):
             raise ValueError(f"{name} has chunks of shape {chunk}")
 
 
@@ -227,10 +227,10 @@ def _full(leaves: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def refuse_difference(
-    file: object, found: Mapping[str, Any], wanted: Mapping[str, Any], error: type[InputError] = InputError
+    file: object, found: Mapping[str, Any], expected: Mapping[str, Any], error: type[InputError] = InputError
 ) -> None:
     """Raises `error` for the first setting that differs, with both values."""
-    as_read = json.loads(json.dumps(dict(wanted)))
+    as_read = json.loads(json.dumps(dict(expected)))
     for name in [*as_read, *(n for n in found if n not in as_read)]:
         if name in IN_FILES and name in as_read and name not in found:
             continue  # of a BDDL definition, before version 0.2

@@ -147,10 +147,10 @@ def _steps(run: Run, width: int) -> dict[str, np.ndarray]:
     """Arrays [T, ...] of the steps of a run. Raises InputError."""
     action, number, flag = np.zeros(width, np.float32), np.float32(0), np.bool_(False)
     label = next((name for name in LABELS if name in run.step_names), "action")
-    wanted = {"action": ("action", action), "label": (label, action), "reward": ("reward/total", number)}
-    wanted |= {name: (name, flag) for name in ("terminated", "truncated")}
+    columns = {"action": ("action", action), "label": (label, action), "reward": ("reward/total", number)}
+    columns |= {name: (name, flag) for name in ("terminated", "truncated")}
     found = {}
-    for name, (column, like) in wanted.items():
+    for name, (column, like) in columns.items():
         found[name] = run.all_rows(f"steps/{column}", like)
         refuse_nonfinite(found[name], run.file, f"{run.name}/steps/{column}", _FIX)
     return found
@@ -164,9 +164,9 @@ def _as_seen(run: Run, obs: Mapping[str, np.ndarray], perception: Perception) ->
         seen = perception(obs)
     except (ValueError, TypeError) as e:  # shapes that the file itself states, and that no image has
         raise run.broken("obs", str(e)) from e
-    wanted = blank(perception, 1)
+    expected = blank(perception, 1)
     vector, image = np.asarray(seen.vector), np.asarray(seen.image)
-    if vector.shape[1] != wanted.vector.shape[1] or image.shape[1] != wanted.image.shape[1]:
-        raise run.broken("obs", f"has {vector.shape[1]} numbers, and {wanted.vector.shape[1]} are expected")
+    if vector.shape[1] != expected.vector.shape[1] or image.shape[1] != expected.image.shape[1]:
+        raise run.broken("obs", f"has {vector.shape[1]} numbers, and {expected.vector.shape[1]} are expected")
     before = {"seen_vector": vector[:-1], "seen_image": image[:-1]}
     return {**before, "after_vector": vector[1:], "after_image": image[1:]}

@@ -86,7 +86,7 @@ class Minibatch:
     raw: Float[Array, "*b n"]
     chance: Float[Array, "*b"]
     advantage: Float[Array, "*b"]
-    wanted: Float[Array, "*b"]
+    value_target: Float[Array, "*b"]
 
 
 @entry_point
@@ -224,7 +224,7 @@ class PPO:
             kept = jnp.clip(ratio, 1 - c.clip_ratio, 1 + c.clip_ratio)
             actor = -jnp.minimum(ratio * batch.advantage, kept * batch.advantage).mean()
             worth: Any = self.value.apply({"params": params[1]}, normal)
-            value = jnp.square(worth - batch.wanted).mean()
+            value = jnp.square(worth - batch.value_target).mean()
             entropy = (log_std + 0.5 * math.log(2 * math.pi * math.e)).sum(-1).mean()
             total = actor + c.value_coef * value - c.entropy_coef * entropy
             found = {"actor_loss": actor, "critic_loss": value, "entropy": entropy}

@@ -366,10 +366,10 @@ class SAC:
         careful = jnp.argmin(chances @ self._support, axis=0)
         chance = jnp.where(careful[:, None] == 0, chances[0], chances[1])
         soft = self._support - alpha * density[:, None]
-        wanted = projected(chance, batch.reward[:, None] + batch.discount[:, None] * soft, self._support)
+        expected = projected(chance, batch.reward[:, None] + batch.discount[:, None] * soft, self._support)
         logits: Any = self.critic.apply({"params": params}, moments.normal(batch.seen.vector), batch.action)
         logs = jax.nn.log_softmax(logits)
-        loss = -(jax.lax.stop_gradient(wanted) * logs).sum(-1).mean(-1).sum()
+        loss = -(jax.lax.stop_gradient(expected) * logs).sum(-1).mean(-1).sum()
         return loss, (jnp.exp(logs) @ self._support).mean()
 
     def _update_actor(
@@ -402,7 +402,7 @@ class SAC:
         (total, found), slope = jax.value_and_grad(loss, has_aux=True)(learner.actor)
         step, actor_opt = self._adam.update(slope, learner.actor_opt)
         actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
-        lack = found["entropy"] - self._entropy  # more entropy than wanted lowers its weight
+        lack = found["entropy"] - self._entropy  # more entropy than the target lowers its weight
         step, alpha_opt = self._adam.update(lack, learner.alpha_opt)
         learner = dataclasses.replace(
             learner,

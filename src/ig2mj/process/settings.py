@@ -71,8 +71,8 @@ def keep_scratch_in_place() -> None:
     """XLA's scratch memory on GPUs gets a pool of its own, where each program finds its own in one place every time.
 
     Else it lies wherever other programs left room. Where a training's iteration is more than one program, Warp then
-    captures CUDA graphs anew in most iterations (`ig2mj.engine.warp.patches.graphs`). The pool grows as needed, beside
-    the memory that JAX takes at its start (XLA_PYTHON_CLIENT_MEM_FRACTION).
+    captures CUDA graphs again in most iterations (`ig2mj.engine.warp.patches.graphs`). The pool grows as needed, next
+    to the memory that JAX takes at its start (XLA_PYTHON_CLIENT_MEM_FRACTION).
 
     Has an effect only before JAX is first used. Does nothing where XLA_FLAGS has the option already.
     """

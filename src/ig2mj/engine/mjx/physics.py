@@ -112,7 +112,7 @@ def own_device() -> Any:
 def uncommitted(tree: Any) -> Any:
     """The same arrays without the device that MJX commits them to.
 
-    A program's outputs are committed as soon as one of its inputs is, and JAX compiles anew for arguments that are: a
+    A program's outputs are committed as soon as one of its inputs is, and JAX compiles again for arguments that are: a
     loop whose carry begins with arrays of the caller's own would compile its program twice.
     """
     return jax.tree.map(lambda a: jax.device_put(np.asarray(a)) if isinstance(a, jax.Array) else a, tree)
