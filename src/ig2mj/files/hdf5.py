@@ -35,7 +35,6 @@ LARGEST_HEAP = 2**28
 _BLOCK = 2**24
 _DEFLATE, _SHUFFLE, _CHECKSUM, _LZF = 1, 2, 3, 32000
 """HDF5's numbers of filters."""
-_PIPELINES = [[*s, *p, *c] for s in ([], [_SHUFFLE]) for p in ([], [_DEFLATE], [_LZF]) for c in ([], [_CHECKSUM])]
 _HARMLESS_INPUT = 2**18
 """Packed bytes that unpack to at most 270 MB, whatever they are."""
 

@@ -6,6 +6,7 @@ before tracing, all together (`plan.RelationPlan`), and of traced pairs, one aft
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
@@ -30,7 +31,7 @@ ANSWERS: dict[str, tuple[Kind, int]] = {
 """Each relation's kind, and which of the kind's answers it is."""
 
 
-class Relations:
+class Relations(abc.ABC):
     """Five relations of pairs (object, target) of object indices, in the order of the pairs.
 
     Axes: W worlds, P pairs.
@@ -56,6 +57,6 @@ class Relations:
         """The object and the target are near each other (nearness.py)."""
         return self.answer("near", pairs)
 
+    @abc.abstractmethod
     def answer(self, relation: str, pairs: Any) -> Bool[Array, "W P"]:
         """A relation of `ANSWERS`, of pairs."""
-        raise NotImplementedError
