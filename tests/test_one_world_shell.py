@@ -121,3 +121,14 @@ def test_a_simulation_goes_on_from_a_world_of_a_batch(tiny_home):
     simulation.step(count=5)
     simulation.reset()
     np.testing.assert_array_equal(simulation.view.object_pos[0], view.object_pos[1])
+
+
+def test_a_simulation_is_a_batch_of_one(simulation):
+    simulation.set_object_pose("apple", [0.1, 0.2, 1.3])
+    other = simulation.fork()
+    simulation.step(count=2)
+    for _ in range(2):
+        other.batch, status = other.core.step(other.batch)
+    assert status.holds.shape == (1,) and int(other.world.step[0]) == int(simulation.world.step[0]) == 2
+    np.testing.assert_array_equal(other.data.qpos, simulation.data.qpos)
+    np.testing.assert_array_equal(other.states.temperature, simulation.states.temperature)
