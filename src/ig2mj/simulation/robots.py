@@ -10,6 +10,7 @@ from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import ActionError, EngineError, UnknownNameError
 from ig2mj.process import entry_point
+from ig2mj.sampling.row import Row
 from ig2mj.simulation.agent import Agent
 from ig2mj.worlds.hands import Held
 
@@ -109,3 +110,9 @@ class RobotsOfWorld:
             for hand, body, on in zip(hands, np.asarray(self.held.body)[0], np.asarray(self.held.held)[0], strict=True):
                 hands[hand] = tables.object_names[tables.graspable_object[body]] if on else None
         return hands
+
+
+def put_row(simulation: Simulation, row: Row) -> None:
+    """The world becomes a sampled one: hands hold what it brings along; controllers remember what they did."""
+    simulation.physics = simulation.engine.load(simulation.physics, row.physics)
+    simulation._put(states=row.states)

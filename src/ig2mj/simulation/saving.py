@@ -10,15 +10,20 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
+from ig2mj.engine.base import Physics
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import InputError
 from ig2mj.scene.scene import Scene
-from ig2mj.states.world import ExtendedStates
+from ig2mj.states.world import ExtendedStates, WorldState
 from ig2mj.worlds.archive import load_exactly, read_header, save_tree
+from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.core import Core
+from ig2mj.worlds.guards import Flag
 from ig2mj.worlds.hands import Held
 from ig2mj.worlds.plugin_states import plugin_defaults, plugin_header, refuse_foreign
 from ig2mj.worlds.pool import check_numbers, check_values
+from ig2mj.worlds.rules import Rules
 
 if TYPE_CHECKING:
     from ig2mj.simulation.simulation import Simulation
@@ -42,6 +47,29 @@ class SavedWorld:
     step: np.ndarray
     controllers: tuple[Any, ...]
     held: Held
+
+
+def first_batch(core: Core, physics: Physics, seed: int) -> Batch:
+    """One world at the start of an episode with this physics; of physics alone the states stay as they are."""
+    nothing = np.zeros(1, np.int32)
+    world = WorldState(
+        physics=physics,
+        view=core.engine.view(physics),
+        states=(core.rules or Rules.of_scene(core.engine.scene)).initial,
+        key=np.asarray(jax.random.key_data(jax.random.key(seed)))[None],
+        step=nothing,
+        time=np.zeros(1, np.float32),
+    )
+    return Batch(
+        world=world,
+        controllers=core.controls.first(),
+        grasps=core.hands.read(physics),
+        number=nothing,
+        seed=np.asarray(seed, np.int32),
+        episode=nothing,
+        flags=nothing,
+        troubles=np.zeros((1, len(Flag)), np.int32),
+    )
 
 
 def everything(simulation: Simulation) -> SavedWorld:

@@ -37,20 +37,18 @@ from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.process.deprecation import warn_renamed
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.placement import Budget
-from ig2mj.sampling.row import Row
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Objects, Scene, scene_with
 from ig2mj.simulation import images
 from ig2mj.simulation.agent import Agent, only_agent
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
 from ig2mj.simulation.recording import Recorded
-from ig2mj.simulation.robots import RobotsOfWorld
+from ig2mj.simulation.robots import RobotsOfWorld, put_row
 from ig2mj.simulation.sampling import WorldSampler
-from ig2mj.simulation.saving import everything, load_world, put_world, save_world
+from ig2mj.simulation.saving import everything, first_batch, load_world, put_world, save_world
 from ig2mj.states.model import DEFAULTS, StateModel
 from ig2mj.states.options import StateOptions
 from ig2mj.states.world import ExtendedStates, WorldState
-from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.plugin_states import completed
@@ -103,29 +101,7 @@ class Simulation(Recorded):
         self._initial = self.engine.export(physics, 0)
         self.last_sampling: dict[str, int] = {}
         self._robots: RobotsOfWorld | None = None
-        self._batch = self._first(physics)
-
-    def _first(self, physics: Physics) -> Batch:
-        """The batch at the start of an episode with this physics."""
-        core, nothing = self.core, np.zeros(1, np.int32)
-        world = WorldState(
-            physics=physics,
-            view=self.engine.view(physics),
-            states=(core.rules or Rules.of_scene(self.scene)).initial,  # physics alone leaves them as they are
-            key=np.asarray(jax.random.key_data(jax.random.key(self._seed)))[None],
-            step=nothing,
-            time=np.zeros(1, np.float32),
-        )
-        return Batch(
-            world=world,
-            controllers=core.controls.first(),
-            grasps=core.hands.read(physics),
-            number=nothing,
-            seed=np.asarray(self._seed, np.int32),
-            episode=nothing,
-            flags=nothing,
-            troubles=np.zeros((1, len(guards.Flag)), np.int32),
-        )
+        self._batch = first_batch(self.core, physics, self._seed)
 
     def __repr__(self) -> str:
         return f"Simulation('{self.scene.name}', engine '{self.engine.name}')"
@@ -167,11 +143,6 @@ class Simulation(Recorded):
     @batch.setter
     def batch(self, batch: Batch) -> None:
         self._batch = batch
-
-    def _put_row(self, row: Row) -> None:
-        """The world becomes a sampled one: hands hold what it brings along; controllers remember what they did."""
-        self.physics = self.engine.load(self.physics, row.physics)
-        self._put(states=row.states)
 
     def _put(self, *, controllers: Any = None, grasps: Any = None, **fields: Any) -> None:
         """Replaces fields of the world, and what controllers remember and hands hold where it is given."""
@@ -280,7 +251,10 @@ class Simulation(Recorded):
 
     def reset(self) -> PhysicsView:
         """Back to the scene's initial state."""
-        self._robots, self._batch = None, self._first(self.engine.load(self.physics, self._initial))
+        self._robots, self._batch = (
+            None,
+            first_batch(self.core, self.engine.load(self.physics, self._initial), self._seed),
+        )
         return self.view
 
     def step(self, ctrl: Vector | None = None, count: int = 1) -> PhysicsView:
@@ -430,7 +404,7 @@ class Simulation(Recorded):
         row = self._sampler.sample(condition, now, self.states, seed, Budget())
         self.last_sampling = dict(self._sampler.rejected)
         if row is not None:
-            self._put_row(row)
+            put_row(self, row)
         return row is not None
 
     @functools.cached_property

@@ -17,6 +17,7 @@ from ig2mj.planning.starts import open_doors, start_place
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.row import Row
 from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.simulation.robots import put_row
 from ig2mj.simulation.simulation import Simulation
 from ig2mj.worlds.pool import Pool
 
@@ -70,7 +71,7 @@ def simulated_episodes(
             continue
         simulation.reset()
         if pool is not None:
-            simulation._put_row(Row(*start_of(pool, number)))
+            put_row(simulation, Row(*start_of(pool, number)))
         if write is not None:
             simulation._write(write)
             simulation.step(count=DOORS_SETTLE)
