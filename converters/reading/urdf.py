@@ -12,7 +12,7 @@ from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.errors import InputError
 
 from ..base import inputs
-from ..base.description import Inertial, Joint, Link, Mimic, ObjectModel
+from ..base.description import ROBOT_CATEGORY, Inertial, Joint, Link, Mimic, ObjectModel
 from ..base.file_access import FileGuard
 from ..base.transforms import read_origin
 from ..base.xml_reader import Element, is_huge, number, numbers, read_xml, where
@@ -21,7 +21,7 @@ from .urdf_leftovers import read_leftovers
 from .urdf_materials import UrdfMaterials
 from .urdf_tree import check_counts, check_name, find_tree
 
-JOINT_TYPES = ("fixed", "revolute", "prismatic", "continuous", "floating", "planar")
+JOINT_TYPES = ("fixed", "revolute", "prismatic", "continuous", "floating")
 MOVING = ("revolute", "prismatic", "continuous")
 
 
@@ -71,7 +71,7 @@ def read_urdf(
         links[link.name] = link
     joints: dict[str, Joint] = {}
     for element in robot.iterfind("joint"):
-        joint = _read_joint(element, path, warnings)
+        joint = _read_joint(element, path, warnings, category == ROBOT_CATEGORY)
         if joint.name in joints:
             raise InputError(path, "this name occurs twice", element=where(element))
         joints[joint.name] = joint
@@ -108,16 +108,16 @@ def _read_inertial(element: Element, file: pathlib.Path) -> Inertial | None:
     return Inertial(mass, inertia, read_origin(element, file))
 
 
-def _read_joint(element: Element, file: pathlib.Path, warnings: list[str]) -> Joint:
+def _read_joint(element: Element, file: pathlib.Path, warnings: list[str], robot: bool) -> Joint:
     name = check_name(element, file, warnings)
     kind = (element.get("type") or "").strip()
+    if kind == "planar" and robot:  # by which planners move a base
+        warnings.append(f"joint '{name}' is planar: it is read as floating")
+        kind = "floating"
     if kind not in JOINT_TYPES:
         raise InputError(
             file, f"joint type '{kind}' is not supported", element=where(element), fix=f"use {', '.join(JOINT_TYPES)}"
         )
-    if kind == "planar":
-        warnings.append(f"joint '{name}' is planar: it is read as floating")
-        kind = "floating"
     ends = []
     for tag in ("parent", "child"):
         end = element.find(tag)
