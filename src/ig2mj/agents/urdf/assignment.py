@@ -35,7 +35,8 @@ LEFT = frozenset(("left", "l", "fl", "rl", "bl", "ml", "lf", "lr", "lb", "lm"))
 RIGHT = frozenset(("right", "r", "fr", "rr", "br", "mr", "rf", "rb", "rm"))
 """Words of a wheel's name that say on which side it is, as in `wheel_fl` and `rl_wheel_joint`."""
 
-GRIPS = ("finger", "gripper", "jaw", "thumb", "knuckle", "claw", "pincer", "driver")
+FINGERS = ("finger", "jaw", "thumb", "knuckle", "claw", "pincer", "driver")
+GRIPS = ("gripper", *FINGERS)
 PASSIVE = ("caster", "castor", "swivel")
 OMNI = ("mecanum", "omni", "swedish", "holonomic")
 SUCTION = ("suction", "vacuum")
@@ -56,7 +57,7 @@ TOUCHES = 0.02
 PARALLEL = 0.95
 """Cosine of the angle between wheels of one direction."""
 
-CLEAR, POSTURES = 0.05, 300
+CLEAR, POSTURES = 0.02, 300
 """m above the floor of an arm at the start, and postures tried, where its file says nothing of it."""
 
 SHORT_BRANCH, ARM_BEFORE = 4, 3
@@ -213,7 +214,7 @@ def _words(name: str) -> set[str]:
 def _grips(robot: Description, joint: RobotJoint) -> bool:
     """It opens and closes a gripper, and does not turn without end. A joint that is not named so, and carries one that
     is, turns the whole gripper."""
-    if joint.type == "continuous" or not _named(joint.child, GRIPS):
+    if joint.type == "continuous" or not _named(joint.child, FINGERS):  # a wrist may turn a whole "gripper_link"
         return joint.type != "continuous" and _named(joint.name, GRIPS)
     if _named(joint.name, GRIPS):
         return True
@@ -365,7 +366,7 @@ def _clearance(body: RobotBody, layout: Layout, start: Mapping[str, float]) -> f
     data = body.posed({name: body.start_of(name, posed) for name in (*layout.arm, *layout.gripper)})
     floor = -body.standing(layout)
     lows = []
-    for link in body.moved_by(layout.arm):
+    for link in body.moved_by(layout.arm[1:] or layout.arm):  # the first joint of most arms only turns them
         points, (pos, turn) = body.points(link), body.pose(link, data)
         if len(points):
             lows.append(float((pos[2] + points @ turn[2]).min()))
