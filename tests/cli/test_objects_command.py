@@ -13,7 +13,7 @@ pytestmark = pytest.mark.usefixtures("own_configuration")
 
 COMMANDS = (
     *("view", "web", "inspect", "states", "predicates", "calibrate", "warm_up", "sample", "sample_task"),
-    *("play", "rollout", "train", "evaluate", "vr"),
+    *("play", "rollout", "train", "evaluate", "vr", "plan", "solve"),
 )
 
 

@@ -212,6 +212,7 @@ def test_commands_print_the_plan_and_solve_it(tiny_home_folder, tmp_path, capsys
         (["plan", "HOME", "(inside ball box)", "--robot", "turtlebot"], "without hands"),
         (["solve", "HOME", "(inside ball box)", "--episodes", "0"], "--episodes 0"),
         (["solve", "PointNavigation"], "PointNavigation has no goal expression"),
+        (["plan", "storing_food", "--object", "cup"], "an activity has its own objects"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(tiny_home_folder, arguments, telling, capsys):

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import tyro
 
-from ig2mj.cli.common.planning import Goal, Objects, What
+from ig2mj.cli.common.objects import AddedObjects
+from ig2mj.cli.common.planning import Goal, What
 
 
 def run(
@@ -16,7 +17,7 @@ def run(
     robot: str = "humanoid",
     split: str = "held_out",
     row: int = 0,
-    add: Objects = (),
+    object: AddedObjects = (),
     pddl: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FOLDER")] = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
@@ -30,10 +31,11 @@ def run(
       robot: which robot is to act: it has as many free hands.
       split: start states of the activity: train or held_out.
       row: number of the start state.
-      add: with a home: add an object of this category (or category/model) from the object library.
+      object: with a home: {object}.
       pddl: also write domain.pddl and problem.pddl to this folder, for planners that read PDDL.
       json: print JSON instead of a table.
     """
+    from ig2mj.cli.common.objects import note_absent
     from ig2mj.cli.common.planning import check_row, domain_of
     from ig2mj.cli.common.printing import make_table, print_json, stdout_console
     from ig2mj.planning.pddl import write_pddl
@@ -42,7 +44,8 @@ def run(
     from ig2mj.planning.task_planner import TaskPlanner
 
     check_row(row)
-    problem = problem_of(what, goal, add)
+    problem = problem_of(what, goal, object)
+    note_absent(problem.scene, object)
     domain = domain_of(problem, robot)
     planner = TaskPlanner(domain, problem.goal)
     facts = start_facts(domain, problem.scene, problem.pool(split, row + 1), row)

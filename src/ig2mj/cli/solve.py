@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ig2mj.cli.common.planning import Goal, Objects, What
+from ig2mj.cli.common.objects import AddedObjects
+from ig2mj.cli.common.planning import Goal, What
 
 
 def run(
@@ -21,7 +22,7 @@ def run(
     split: str = "held_out",
     seed: int = 0,
     seconds: float = float("inf"),
-    add: Objects = (),
+    object: AddedObjects = (),
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     record: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
@@ -42,7 +43,7 @@ def run(
       split: start states of the activity: train or held_out.
       seed: of what is sampled; the same seed gives the same result.
       seconds: wall time of an episode after which it ends.
-      add: with a home: add an object of this category (or category/model) from the object library.
+      object: with a home: {object}.
       out: file of results, one line of JSON for each episode; episodes that it holds already are not repeated.
       record: write the episodes as a recording, which replays; with one world.
       video: write a video (.mp4 or .gif) of the episodes; with one world.
@@ -52,6 +53,7 @@ def run(
     import time
 
     from ig2mj.cli.common.files import check_output, check_video
+    from ig2mj.cli.common.objects import note_absent
     from ig2mj.cli.common.planning import domain_of
     from ig2mj.cli.common.solving import Options, StepTable, print_figures, print_result, solved
     from ig2mj.errors import Ig2mjError
@@ -74,7 +76,8 @@ def run(
     if video is not None:
         check_video(video)
     began = time.monotonic()
-    problem = problem_of(what, goal, add)
+    problem = problem_of(what, goal, object)
+    note_absent(problem.scene, object)
     domain = domain_of(problem, robot)
     planner = TaskPlanner(domain, problem.goal)
     conditions = {"problem": problem.name, "goal": goal, "robot": robot, "rung": rung, "split": split, "seed": seed}

@@ -64,13 +64,16 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) 
 
     Args:
       what: an activity of BEHAVIOR or of the paper, a home that ships, or a folder of a scene.
-      goal: expression; None: that of the activity. objects: what is added to the scene from the object library.
+      goal: expression; None: that of the activity. objects: what is added to a home, and changed in it (`load_scene`).
 
     Raises:
-      UnknownNameError: no such activity, scene, object or predicate. PlanningError: a scene without a goal.
+      UnknownNameError: no such activity, scene, object or predicate. PlanningError: a scene without a goal, or objects
+      for an activity.
       ExpressionError: the goal is not an expression.
     """
     short = what.removeprefix(PREFIX)
+    if objects and (short in activity_names() or short in TASKS):
+        raise PlanningError(f"{short}: an activity has its own objects; add yours to a home, and give a goal")
     if short in activity_names():
         task = bddl_task(short)
         scene = load_bound(task.binding)

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 What = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ACTIVITY|SCENE")]
 Goal = Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="GOAL")]
-Objects = Annotated[tuple[str, ...], tyro.conf.arg(metavar="CATEGORY")]
 
 
 def check_row(row: int) -> None:
