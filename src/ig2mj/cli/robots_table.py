@@ -20,11 +20,12 @@ MODES = ("physical", "assisted")
 HEAD = """\
 # Robots of different makers
 
-`ig2mj robots table` converts the robots of a list, `{list}`, and tries them in `{home}`. The files are those of the
-packages of the last column, which belong to their authors; nothing of them is part of ig2mj.
+`ig2mj robots table` converts the robots of a list, `{list}`, and tries them in
+`{home}`. The files are those of the packages of the last column, which belong to their authors;
+nothing of them is part of ig2mj.
 
-- *stands*: for 5 s without a command no joint of an arm sags by 0.05 rad and no base tilts by 5 degrees or drifts
-  by 3 cm.
+- *stands*: for 5 s without a command no joint of an arm sags by 0.05 rad, and no base tilts by
+  5 degrees or drifts by 3 cm.
 - *drives*: metres ahead, of robots with wheels; the trial ends at 1 m.
 - *lifts*: tries of ten in which a cube of 0.2 kg, {cubes} wide as the gripper allows, is 8 cm
   higher after the lift. Its position and its angle differ between tries.
