@@ -134,7 +134,7 @@ def _same(a: Any, b: Any, what: str, like: Likeness) -> None:
     ):
         close = within if np.issubdtype(x.dtype, np.floating) else 0.0
         differs = ~np.isclose(x, y, rtol=close, atol=close) if close else x != y
-        name = getattr(path[-1], "key", None)
+        name = str(getattr(path[-1], "key", ""))
         if within and name in SENSORS and SENSORS[name].looks:
             rays = differs.any(-1).reshape(len(differs), -1)
             differs = rays.sum(1) > max(1, int(JUMPS * rays.shape[1]))
