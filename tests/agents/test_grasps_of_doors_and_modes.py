@@ -60,6 +60,7 @@ def test_a_sticky_hand_pulls_open_what_it_closes_on(at_cabinet, joint, height):
     assert world.held == [None, None]
 
 
+@pytest.mark.slow
 def test_a_sticky_hand_needs_no_rays_and_an_assisted_one_does(tiny_home_folder, at_cabinet):
     """The front of a drawer is before the fingers, not between them and the palm."""
     assisted = Grasping(at_cabinet.scene, "assisted")

@@ -77,6 +77,7 @@ def held(engine, loaded, gpu, monkeypatch) -> Iterator[threading.Event]:
     concurrent.futures.wait([engine.loading], 60)
 
 
+@pytest.mark.slow
 def test_worlds_do_not_start_before_the_kernels_are_there(engine, held, monkeypatch):
     events: list[str] = []
     first = engine._first

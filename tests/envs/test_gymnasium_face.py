@@ -100,6 +100,7 @@ def test_gymnasium_imports_ig2mj_for_a_name_with_a_module():
     assert done.stderr.splitlines()[-1].endswith("is named 'robt'; near matches: robot"), done.stderr
 
 
+@pytest.mark.slow
 def test_each_world_starts_as_an_environment_of_one_world_with_its_seed(made):
     one = gymnasium.make(ID, pool_size=ROWS)
     seeds = [7, 11]

@@ -148,6 +148,7 @@ def test_the_success_that_is_reported_is_not_too_high_when_the_experts_help_ends
     assert not np.asarray(apart).any()
 
 
+@pytest.mark.slow
 def test_dagger_s_reported_success_is_not_too_high_when_the_expert_leaves():
     """Of episodes without the expert half succeed, after 5 to 35 steps; the others take 200. With it all succeed."""
     rng, worlds, leaves = np.random.default_rng(0), 1000, 600

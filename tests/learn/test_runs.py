@@ -71,6 +71,7 @@ def rows(out):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_a_resumed_run_goes_on_with_what_was_learned(done, tmp_path):
     env, out, result = done
     like = {"learner": algorithm(env).init(jax.random.PRNGKey(7)), "key": jax.random.PRNGKey(0)}

@@ -133,6 +133,7 @@ def test_a_collector_that_the_user_switched_off_stays_off():
         gc.enable()
 
 
+@pytest.mark.slow
 def test_nothing_is_collected_while_warp_captures():
     """On a CPU a capture is a recording; the repair is the same."""
     prepare_warp()
