@@ -329,12 +329,30 @@ shoulder = 0.4
 """
 
 
+ROVER = """<mujoco><compiler angle="radian"/><worldbody>
+<body name="rover" pos="0 0 0.05"><freejoint/><geom type="box" size="0.2 0.15 0.03"/>
+<body name="rover_left" pos="0 0.2 0" quat="0.7071068 0.7071068 0 0">
+<joint name="rover_left_wheel" axis="0 0 1"/><geom type="cylinder" size="0.05 0.02"/></body>
+<body name="rover_right" pos="0 -0.2 0" quat="0.7071068 0.7071068 0 0">
+<joint name="rover_right_wheel" axis="0 0 1"/><geom type="cylinder" size="0.05 0.02"/></body>
+<body name="rover_arm" pos="0 0 0.1"><joint name="rover_shoulder" axis="0 1 0" range="-1 1"/>
+<geom type="box" size="0.02 0.02 0.1"/>
+<body name="rover_tip" pos="0 0 0.1"><joint name="rover_finger" type="slide" axis="0 1 0" range="0 0.04"/>
+<geom type="box" size="0.01 0.01 0.02"/></body>
+<body name="rover_thumb" pos="0 0.05 0.1"><joint name="rover_thumb" type="slide" axis="0 1 0" range="0 0.04"/>
+<geom type="box" size="0.01 0.01 0.02"/></body></body></body></worldbody></mujoco>"""
+
+
 def robots(folder: pathlib.Path) -> Reader:
+    from ig2mj.agents.urdf.assignment import find_layout
+    from ig2mj.agents.urdf.body import MODEL_FILE, RobotBody
     from ig2mj.agents.urdf.description import ROBOT_FILE, Description
-    from ig2mj.agents.urdf.layout import Layout
+
+    (folder / MODEL_FILE).write_text(ROVER)
 
     def read(file: pathlib.Path) -> None:
-        Layout.found(Description.load(file.parent))
+        description = Description.load(file.parent)
+        find_layout(description, RobotBody(file.parent, description))
 
     return Reader(file_reader(folder / ROBOT_FILE, read), json.dumps(ROBOT).encode(), json_or_bytes)
 
@@ -342,11 +360,15 @@ def robots(folder: pathlib.Path) -> Reader:
 def layouts(folder: pathlib.Path) -> Reader:
     import tomllib
 
+    from ig2mj.agents.urdf.assignment import find_layout
+    from ig2mj.agents.urdf.body import MODEL_FILE, RobotBody
     from ig2mj.agents.urdf.description import ROBOT_FILE, Description
-    from ig2mj.agents.urdf.layout import Layout
+    from ig2mj.agents.urdf.layout_file import read_entries
 
     (folder / ROBOT_FILE).write_text(json.dumps(ROBOT))
+    (folder / MODEL_FILE).write_text(ROVER)
     robot = Description.load(folder)
+    body = RobotBody(folder, robot)
     toml, other = folder / "layout.toml", folder / "layout.json"
 
     def mutate(valid: bytes, seed: int) -> tuple[pathlib.Path, bytes]:
@@ -356,7 +378,7 @@ def layouts(folder: pathlib.Path) -> Reader:
 
     def read(given: tuple[pathlib.Path, bytes]) -> None:
         given[0].write_bytes(given[1])
-        Layout.load(robot, given[0])
+        find_layout(robot, body, read_entries(given[0]), str(given[0]))
 
     return Reader(read, LAYOUT.encode(), mutate, whole=(toml, LAYOUT.encode()))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 from typing import Any
 
@@ -125,7 +126,8 @@ def test_a_finger_within_ten_centimetres_of_the_button_flips_it_at_the_fifth_ste
         action[0, robots.action_names.index(key)] = value
     near = 0
     for _ in range(120):
-        ctrl, robots.controllers = core.controls.act(action, simulation.view, robots.controllers)
+        ctrl, controllers = core.controls.act(action, simulation.view, robots.controllers)
+        simulation.batch = dataclasses.replace(simulation.batch, controllers=controllers)
         simulation.step(np.asarray(ctrl)[0])
         near = near + 1 if nearest_finger(simulation, button) < 0.1 else 0
         assert simulation.predicate("toggled_on", "stove") == (near >= 5)
@@ -150,7 +152,8 @@ def put_into_hand(world: GraspingWorld, hand: str, name: str) -> None:
     held = grasping.initial(1).replace(body=body, held=body >= 0, local=grasping._parameters(world.view, body))
     engine = world.simulation.engine
     engine.write(world.simulation.physics, jax.tree.map(np.asarray, grasping.write(held)))
-    robots.held = robots._core.hands.read(world.simulation.physics)
+    grasps = robots._core.hands.read(world.simulation.physics)
+    world.simulation.batch = dataclasses.replace(world.simulation.batch, grasps=grasps)
 
 
 @pytest.mark.parametrize("name", ["humanoid", pytest.param("fetch", marks=pytest.mark.slow)])

@@ -96,7 +96,7 @@ def check_able(task: AnyTask, name: str, body: TaskRobot) -> None:
         role_of(task, name, body)
         return
     others = f"({', '.join(task.robots)} can)"
-    if isinstance(task, NavigationTask) and not body.drives and (task.goal != "reach" or not body.hand_count):
+    if isinstance(task, NavigationTask) and not body.drives and (task.goal != "reach" or not body.own_actions):
         raise EngineError(f"robot '{name}' does not drive: it cannot do {task.name} {others}")
     if not body.hand_count and not (isinstance(task, NavigationTask) and task.goal == "point"):
         raise EngineError(f"robot '{name}' has no hand: it cannot do {task.name} {others}")

@@ -21,7 +21,6 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 
-import networkx
 import numpy as np
 
 from ig2mj.planning.domain import SYMMETRIC, Domain, condition_of
@@ -194,6 +193,8 @@ class _Builder:
         return sorted(tried, key=lambda c: self._failed.get(c, 0) >= LATER)
 
     def _supports_first(self, places: Sequence[Condition]) -> list[Condition]:
+        import networkx  # 90 ms that importing ig2mj.Simulation does not spend
+
         graph = networkx.DiGraph()
         graph.add_nodes_from(dict.fromkeys(c.arguments[0] for c in places))
         for c in places:

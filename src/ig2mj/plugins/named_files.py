@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import os
 import pathlib
 import sys
 from types import ModuleType
 
 from ig2mj.errors import PluginError
 from ig2mj.plugins.entry_points import VARIABLE, switches
+from ig2mj.process.settings import name_for_processes
 
 _imported: set[str] = set()
 
@@ -34,11 +34,9 @@ def name_file(file: str) -> None:
       PluginError: it cannot be imported.
     """
     word = str(pathlib.Path(file).absolute()) if file.endswith(".py") else file
-    words = [known for known in os.environ.get(VARIABLE, "").split(",") if known]
     if "," in word:
         raise PluginError(f"plug-in {file}: {VARIABLE} has commas between its words; choose a path without one")
-    if word not in words:
-        os.environ[VARIABLE] = ",".join([*words, word])
+    name_for_processes(VARIABLE, word, ",")
     import_named()
 
 

@@ -93,6 +93,13 @@ def keep_compiled_in(folder: pathlib.Path) -> None:
     os.environ[CACHE_VARIABLE] = str(folder.expanduser().resolve())
 
 
+def name_for_processes(variable: str, word: str, separator: str) -> None:
+    """Adds a word to a list in an environment variable, which processes that are started take over."""
+    words = [known for known in os.environ.get(variable, "").split(separator) if known]
+    if word not in words:
+        os.environ[variable] = separator.join([*words, word])
+
+
 def name_opengl_platform() -> None:
     """PyOpenGL is for the platform that this process draws with, EGL where it does not draw yet, if nobody decided."""
     os.environ.setdefault("PYOPENGL_PLATFORM", used_gl() or "egl")

@@ -151,9 +151,7 @@ def read_model(folder: pathlib.Path, *, named: bool = False) -> LibraryModel:
     entry = manifest.objects[0]
     if entry.category == ROBOT:
         raise InputError(folder, "holds a robot, not an object", fix="robots are given by --robot, or `agents=[...]`")
-    model = LibraryModel(entry.category, entry.model, folder, own=True, named=named)
-    model.__dict__["manifest"] = manifest
-    return model
+    return LibraryModel(entry.category, entry.model, folder, own=True, named=named)
 
 
 def folder_of(wanted: str) -> pathlib.Path | None:

@@ -13,6 +13,7 @@ from typing import Any
 from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
 from ig2mj.install_hint import pip_install_module
 from ig2mj.plugins.named_files import import_named
+from ig2mj.process.settings import name_for_processes
 from ig2mj.tasks.bddl.task import DEFINITION, PREFIX, bddl_task
 from ig2mj.tasks.custom.code import line_in, shown
 from ig2mj.tasks.custom.definition import CustomTask, RegisteredTask, register
@@ -50,10 +51,7 @@ def use_task(reference: str) -> AnyTask:
         file, task = definition, _register_definition(definition)
     else:
         task, file = task_of_file(reference), reference.rpartition(":")[0]
-    files = [*filter(None, os.environ.get(VARIABLE, "").split(os.pathsep))]
-    file = str(pathlib.Path(file).resolve())
-    if file not in files:
-        os.environ[VARIABLE] = os.pathsep.join([*files, file])
+    name_for_processes(VARIABLE, str(pathlib.Path(file).resolve()), os.pathsep)
     return task
 
 
@@ -171,7 +169,7 @@ def import_file(file: str | os.PathLike) -> ModuleType:
     before = sys.modules.get(name)
     sys.modules[name] = module
     try:
-        exec(compile(source, full, "exec"), module.__dict__)
+        exec(compile(source, full, "exec"), vars(module))
     except BaseException as e:
         if before is None:
             del sys.modules[name]
