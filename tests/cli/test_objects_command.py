@@ -7,7 +7,7 @@ import typing
 import pytest
 
 from ig2mj import cli
-from ig2mj.cli.common.objects import AddedObjects
+from ig2mj.cli.common.objects import AddedObjects, load_home
 
 pytestmark = pytest.mark.usefixtures("own_configuration")
 
@@ -91,3 +91,10 @@ def test_old_names_take_several_values_after_one_option():
 
     words = with_new_names(run, "ig2mj sample", ["birch", "--add", "apple", "plate", "--count", "2"])
     assert words == ["birch", "--object", "apple", "--object", "plate", "--count", "2"]
+
+
+def test_what_goes_with_a_removed_object_is_said(tiny_home_folder, capsys):
+    scene = load_home(tiny_home_folder, ("remove:table",))
+    gone = [name for name in scene.removed if name != "table"]
+    assert gone
+    assert capsys.readouterr().err == f"note: {', '.join(gone)}: removed with what they stood on or in\n"

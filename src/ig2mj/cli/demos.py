@@ -59,7 +59,7 @@ def collect(
       resume: continue an interrupted collection.
     """
     from ig2mj.cli.common.files import check_output
-    from ig2mj.cli.common.objects import note_absent
+    from ig2mj.cli.common.objects import note_changes
     from ig2mj.cluster.job_runner import map_jobs
     from ig2mj.cluster.jobs import JobSet
     from ig2mj.demos.collection import collection_jobs, join_recordings
@@ -99,7 +99,7 @@ def collect(
     count = pool_size or None
     common = {"observations": VECTORS, "split": split, "pool_size": count, "objects": object}
     first = make(env, robot, 1, "native", grasping, **common)
-    note_absent(first.scene, object)
+    note_changes(first.scene, object)
     expert_of(first)  # errors before any work
     first.close()
     title = f"demonstrations of {env}"

@@ -47,7 +47,7 @@ def list_objects(
         ]
         columns = ["name", "size (m)", "> kg", "abilities, [links]", "?where"]
         console = stdout_console()
-        console.print(make_table(f"{len(found)} objects, for --object NAME", columns, rows, console.width))
+        console.print(make_table("Objects for --object NAME", columns, rows, console.width))
     if image is not None and found:
         _write_sheet(found, image)
     return 0 if found or not word else 1

@@ -35,7 +35,7 @@ def run(
       pddl: also write domain.pddl and problem.pddl to this folder, for planners that read PDDL.
       json: print JSON instead of a table.
     """
-    from ig2mj.cli.common.objects import note_absent
+    from ig2mj.cli.common.objects import note_changes
     from ig2mj.cli.common.planning import check_row, domain_of
     from ig2mj.cli.common.printing import make_table, print_json, stdout_console
     from ig2mj.planning.pddl import write_pddl
@@ -45,7 +45,7 @@ def run(
 
     check_row(row)
     problem = problem_of(what, goal, object)
-    note_absent(problem.scene, object)
+    note_changes(problem.scene, object)
     domain = domain_of(problem, robot)
     planner = TaskPlanner(domain, problem.goal)
     facts = start_facts(domain, problem.scene, problem.pool(split, row + 1), row)
@@ -69,7 +69,7 @@ def run(
         print("the goal holds already")
         return 0
     rows = [(k + 1, s.primitive, " ".join(s.arguments), str(s.serves)) for k, s in enumerate(plan.steps)]
-    title = f"{problem.name} in {problem.scene.name}: {len(rows)} steps, {len(plan.missing)} conditions are false"
+    title = f"{problem.name} in {problem.scene.name}: steps for {len(plan.missing)} of the goal's conditions"
     console = stdout_console()
     console.print(make_table(title, (">", "primitive", "arguments", "?for"), rows, console.width))
     return 0

@@ -53,7 +53,7 @@ def run(
             print(f"{binding.shown:16} {binding.command}")
         return 0
     from ig2mj.cli.common.files import check_output
-    from ig2mj.cli.common.objects import note_absent
+    from ig2mj.cli.common.objects import note_changes
     from ig2mj.envs.registry import find_task, make
     from ig2mj.tasks.navigation.task import NavigationTask
     from ig2mj.viewer.interactive import check_display
@@ -77,7 +77,7 @@ def run(
         period=1 / STEPS_PER_SECOND,
         objects=object,
     ).with_horizon(FOREVER)
-    note_absent(made.scene, object)
+    note_changes(made.scene, object)
     made.step(made.reset(seed), np.zeros((1, *made.action_space.shape), np.float32))  # compiles before the window opens
     if record is not None:
         from ig2mj.demos import record as recorded

@@ -75,7 +75,7 @@ def run(
     import numpy as np
 
     from ig2mj.cli.common.files import check_output, check_video
-    from ig2mj.cli.common.objects import note_absent
+    from ig2mj.cli.common.objects import note_changes
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
     from ig2mj.errors import Ig2mjError, UnknownNameError
@@ -114,7 +114,7 @@ def run(
         variant=variant,
         objects=objects,
     )
-    note_absent(played.scene, objects)
+    note_changes(played.scene, objects)
     if record is not None:
         from ig2mj.demos import record as recorded
 

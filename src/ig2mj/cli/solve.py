@@ -53,7 +53,7 @@ def run(
     import time
 
     from ig2mj.cli.common.files import check_output, check_video
-    from ig2mj.cli.common.objects import note_absent
+    from ig2mj.cli.common.objects import note_changes
     from ig2mj.cli.common.planning import domain_of
     from ig2mj.cli.common.solving import Options, StepTable, print_figures, print_result, solved
     from ig2mj.errors import Ig2mjError
@@ -77,7 +77,7 @@ def run(
         check_video(video)
     began = time.monotonic()
     problem = problem_of(what, goal, object)
-    note_absent(problem.scene, object)
+    note_changes(problem.scene, object)
     domain = domain_of(problem, robot)
     planner = TaskPlanner(domain, problem.goal)
     conditions = {"problem": problem.name, "goal": goal, "robot": robot, "rung": rung, "split": split, "seed": seed}

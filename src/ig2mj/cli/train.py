@@ -119,7 +119,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
 
     import jax
 
-    from ig2mj.cli.common.objects import note_absent
+    from ig2mj.cli.common.objects import note_changes
     from ig2mj.cli.train_videos import TrainingVideos
     from ig2mj.cluster.process_topology import find_topology
     from ig2mj.cluster.team import Team
@@ -171,7 +171,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
                 sensors=SensorOptions(rows=rendered_rows(settings.rows, settings.image_size)),
                 objects=chosen.objects,
             )
-            note_absent(world.scene, chosen.objects)
+            note_changes(world.scene, chosen.objects)
         depth_range = settings.depth_range or depth_range_of(world)
         images = settings.image_size, settings.rows, world.privileged_names, depth_range
         perception = Perception(world.observation_spaces, obs, *images)

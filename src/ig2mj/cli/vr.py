@@ -87,12 +87,12 @@ def run(
 
 
 def _environment(task: str, grasping: str, pool_size: int, row: int, objects: tuple[str, ...]):
-    from ig2mj.cli.common.objects import note_absent
+    from ig2mj.cli.common.objects import note_changes
     from ig2mj.errors import Ig2mjError
     from ig2mj.vr.session import person_environment
 
     env = person_environment(task, grasping, pool_size=pool_size or None, objects=objects)
-    note_absent(env.scene, objects)
+    note_changes(env.scene, objects)
     if row >= env.core.starts.pool.size:
         raise Ig2mjError(f"--row {row}: the task has start states 0 to {env.core.starts.pool.size - 1}")
     return env

@@ -140,7 +140,7 @@ def _recording(file: pathlib.Path) -> Source:
 def _task(
     name: str, worlds: int, engine: str, agent: str, robot: str | None, seed: int, objects: tuple[str, ...]
 ) -> Source:
-    from ig2mj.cli.common.objects import note_absent
+    from ig2mj.cli.common.objects import note_changes
     from ig2mj.cli.rollout import AGENTS, policy_named, who_acts
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.learn.policies import objects_of
@@ -151,7 +151,7 @@ def _task(
         objects = objects_of(policy, agent)
     seen = VECTORS if policy is None else policy.observations
     env = make(name, robot, worlds, engine, observations=seen, objects=objects)
-    note_absent(env.scene, objects)
+    note_changes(env.scene, objects)
     return Acting(env, who_acts(agent, policy, env, seed), seed)
 
 

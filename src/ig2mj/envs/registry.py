@@ -84,7 +84,7 @@ def find_task(name: str) -> AnyTask:
         return bddl_task(activity)
     short = short_name(name)
     if short is None:
-        also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`), those of a file of yours FILE.py:NAME"
+        also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`), tasks of yours FILE.py:NAME"
         raise UnknownNameError("environment", name.removeprefix(f"{NAMESPACE}/"), list_envs(), also=also)
     return REGISTERED[short].task if short in REGISTERED else TASKS[short]
 

@@ -7,6 +7,7 @@ problem_of("small_home", "(inside apple_0 fridge_0)")         a goal of one's ow
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,6 +19,7 @@ from ig2mj.errors import UnknownNameError
 from ig2mj.planning.steps import PlanningError
 from ig2mj.predicates.compile import CompiledExpression, compile_expression
 from ig2mj.predicates.host_queries import HostQueries
+from ig2mj.predicates.literals import AbilityWarning
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.states.model import StateModel
 from ig2mj.tasks.bddl.definitions import activity_names
@@ -99,7 +101,9 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) 
 
 
 def _compiled(model: StateModel, goal: str) -> CompiledExpression:
-    return compile_expression(model, goal, questions=HostQueries.of(model))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AbilityWarning)  # what cannot be true is refused when a plan is made
+        return compile_expression(model, goal, questions=HostQueries.of(model))
 
 
 def start_of(pool: Pool, number: int) -> tuple[Snapshot, Any]:

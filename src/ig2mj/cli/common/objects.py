@@ -58,19 +58,24 @@ def with_changes(function: Callable[..., Any], args: Sequence[str]) -> list[str]
 
 
 def load_home(scene: str | os.PathLike, objects: Sequence[str] = (), agents: Sequence[Agent] = ()) -> Scene:
-    """`load_scene`; says on stderr which objects were given no place. Raises as `load_scene`."""
+    """`load_scene`, with the notes of `note_changes`. Raises as `load_scene`."""
     from ig2mj.scene.scene import load_scene
 
     loaded = load_scene(scene, agents, objects)
-    note_absent(loaded, objects)
+    note_changes(loaded, objects)
     return loaded
 
 
-def note_absent(scene: Scene, objects: Sequence[str]) -> None:
-    """Says on stderr which of the objects of a command line stand outside the house, and how to place them."""
+def note_changes(scene: Scene, objects: Sequence[str]) -> None:
+    """Says on stderr what the changes of a command line do to a home: what goes with an object that is taken out
+    or replaced, and which objects stand outside the house, with how to place them.
+    """
     from ig2mj.scene.changes import added
     from ig2mj.scene.object_requests import read_request
 
+    gone = [name for name in scene.removed if f"remove:{name}" not in objects]
+    if gone:
+        print(f"note: {', '.join(gone)}: removed with what they stood on or in", file=sys.stderr)
     objects = added(objects)
     given = scene.additions[-len(objects) :] if objects else ()
     absent = [(a, text) for a, text in zip(given, objects, strict=True) if a.place is None and a.start is None]
