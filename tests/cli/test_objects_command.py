@@ -7,7 +7,9 @@ import typing
 import pytest
 
 from ig2mj import cli
+from ig2mj.cli.common.hand import with_hand
 from ig2mj.cli.common.objects import AddedObjects, load_home
+from ig2mj.cli.web import _home
 
 pytestmark = pytest.mark.usefixtures("own_configuration")
 
@@ -98,3 +100,10 @@ def test_what_goes_with_a_removed_object_is_said(tiny_home_folder, capsys):
     gone = [name for name in scene.removed if name != "table"]
     assert gone
     assert capsys.readouterr().err == f"note: {', '.join(gone)}: removed with what they stood on or in\n"
+
+
+def test_a_hand_and_states_that_are_set_come_into_the_changed_home(tiny_home_folder):
+    scene = load_home(tiny_home_folder, ("remove:table",))
+    assert with_hand(scene, tiny_home_folder)[0].removed == scene.removed
+    home = _home(str(tiny_home_folder), None, ("open=cabinet",), None, 1, "native", ("remove:table",))
+    assert "table" not in [o.name for o in home.scene.manifest.objects]

@@ -185,6 +185,6 @@ def _home(
     core = Core(make_engine(engine, scene, worlds), rules, None if pool is None else load_pool(pool, scene))
     if not set:
         return Home(scene, core, compiled)
-    one = started(pathlib.Path(name), "paper", 0.0, set, objects=[a.wanted for a in scene.additions])
+    one = started(pathlib.Path(name), "paper", 0.0, set, objects=scene.requested)
     states = jax.tree.map(lambda a: np.repeat(np.asarray(a), worlds, 0), one.states)
     return Home(scene, core, compiled, lambda core, batch: core.load(batch, one.engine.export(one.physics, 0), states))

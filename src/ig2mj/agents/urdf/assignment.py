@@ -321,7 +321,7 @@ def _hand(robot: Description, arm: Sequence[str], gripper: Sequence[str], suctio
 
 
 def _first(robot: Description, names: Sequence[str], on_base: bool = False) -> str | None:
-    """The first link of the likeliest name; an optical frame only where there is no other. on_base: those that are
+    """The first link of the most likely name; an optical frame only where there is no other. on_base: those that are
     fixed to the base come first."""
     for part in names:
         found = [link for link in robot.frames if part in link.lower()]

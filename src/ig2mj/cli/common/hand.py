@@ -24,5 +24,4 @@ def with_hand(scene: Scene, folder: str | os.PathLike) -> tuple[Scene, Reach]:
     from ig2mj.scene.scene import load_scene
 
     reach = find_reach(scene)
-    objects = [addition.wanted for addition in scene.additions]
-    return load_scene(folder, [FloatingHand(pos=reach.start)], objects), reach
+    return load_scene(folder, [FloatingHand(pos=reach.start)], scene.requested), reach
