@@ -18,7 +18,7 @@ from ig2mj.agents.base import Controller
 from ig2mj.agents.humanoid.frames import HAND_POS, HAND_QUAT, HAND_REACH, SHOULDER_POS
 from ig2mj.agents.task_robot import HandControl, TaskRobot
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import (
+from ig2mj.geometry.host_rotations import (
     length,
     matrix_to_quat,
     quat_conjugate,

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import PhysicsView
-from ig2mj.geometry.poses import rotation_angle
+from ig2mj.geometry.host_rotations import rotation_angle
 from ig2mj.planning.bodies import Body, Rows, Senses, goals_of_hand, grip_of, sense
 from ig2mj.planning.phases import REASON_NUMBERS, Base, Phase, Programs, Until
 

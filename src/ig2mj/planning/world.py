@@ -9,7 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import PhysicsView
-from ig2mj.geometry.poses import matrices_on_host, quat_conjugate, quat_multiply, quat_rotate
+from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_rotate
+from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.bodies import HoveringBody, Senses, grip_of, sense
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain

@@ -1,0 +1,90 @@
+"""Rotations in NumPy alone: the functions of `ig2mj.geometry.poses` with the same names, for code on the host.
+
+A call of an operation of JAX on a few numbers takes 50 times as long as one of NumPy. Quaternions are w,x,y,z and of
+unit length; every function broadcasts over leading axes (`*b`) and keeps the floating-point type of its arguments.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+Quat = Float[np.ndarray, "*#b 4"]
+Vec = Float[np.ndarray, "*#b 3"]
+
+_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0], np.float32)
+
+
+def length(v: Float[np.ndarray, "*b d"]) -> Float[np.ndarray, "*b"]:
+    """Euclidean length."""
+    return np.sqrt(np.sum(np.square(v), axis=-1))
+
+
+def cross(a: Vec, b: Vec) -> Float[np.ndarray, "*b 3"]:
+    """Cross product; for a few vectors five times as fast as NumPy's."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def quat_conjugate(q: Quat) -> Float[np.ndarray, "*b 4"]:
+    """Inverse rotation."""
+    return q * _CONJUGATE
+
+
+def quat_multiply(a: Quat, b: Quat) -> Float[np.ndarray, "*b 4"]:
+    """The rotation that turns by `b` first and by `a` then."""
+    aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def quat_rotate(q: Quat, v: Vec) -> Float[np.ndarray, "*b 3"]:
+    """`v` turned by `q`."""
+    w, u = q[..., :1], q[..., 1:]
+    twice = 2 * cross(u, v)
+    return v + w * twice + cross(u, twice)
+
+
+def quat_rotate_inverse(q: Quat, v: Vec) -> Float[np.ndarray, "*b 3"]:
+    """`v` turned by the inverse of `q`."""
+    return quat_rotate(quat_conjugate(q), v)
+
+
+def quat_to_rotation_vector(q: Quat) -> Float[np.ndarray, "*b 3"]:
+    """Axis times angle, the angle in [0, pi]."""
+    q = np.where(q[..., :1] < 0, -q, q)
+    sine = length(q[..., 1:])[..., None]
+    small = sine < 1e-6
+    safe = np.where(small, 1, sine)
+    return q[..., 1:] * np.where(small, 2, 2 * np.arctan2(safe, q[..., :1]) / safe)
+
+
+def rotation_angle(a: Quat, b: Quat) -> Float[np.ndarray, "*b"]:
+    """Angle between two orientations, in [0, pi]."""
+    relative = quat_multiply(quat_conjugate(a), b)
+    return 2 * np.arctan2(length(relative[..., 1:]), np.abs(relative[..., 0]))
+
+
+def matrix_to_quat(m: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "4"]:
+    """Unit quaternion with w >= 0 of one rotation matrix, stable for every angle (Shepperd's method)."""
+    (m00, m01, m02), (m10, m11, m12), (m20, m21, m22) = np.asarray(m)
+    columns = np.array(
+        [
+            [1 + m00 + m11 + m22, m21 - m12, m02 - m20, m10 - m01],
+            [m21 - m12, 1 + m00 - m11 - m22, m10 + m01, m02 + m20],
+            [m02 - m20, m10 + m01, 1 - m00 + m11 - m22, m21 + m12],
+            [m10 - m01, m02 + m20, m21 + m12, 1 - m00 - m11 + m22],
+        ]
+    )
+    chosen = columns[int(np.argmax(np.diagonal(columns)))]
+    chosen = chosen / np.linalg.norm(chosen)
+    return -chosen if chosen[0] < 0 else chosen
