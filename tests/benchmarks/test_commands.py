@@ -10,7 +10,7 @@ import pytest
 from benchmarks.harness.paths import ROOT, module
 
 PAGES = sorted([ROOT / "README.md", ROOT / "benchmarks" / "README.md", *(ROOT / "docs").rglob("*.md")])
-TABLE = re.compile(r"`((?:speed|peers|learning|soak|sampling)\.[a-z_0-9]+)\b")
+TABLE = re.compile(r"`((?:speed|peers|learning|soak|sampling|planning)\.[a-z_0-9]+)\b")
 COMMAND = re.compile(r"python (?:-m )?(benchmarks[./][\w./]+)")
 
 
@@ -32,7 +32,7 @@ def test_the_readme_of_benchmarks_names_every_program():
     named = set(TABLE.findall((ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")))
     parts = {"benchmarks.speed.scaling_worker", "benchmarks.peers.pybullet_worker"}
     parts |= {"benchmarks.learning.time_to_success_worker", "benchmarks.peers.genesis_run"}
-    parts |= {"benchmarks.peers.genesis_export"}
+    parts |= {"benchmarks.peers.genesis_export", "benchmarks.planning.worker"}
     assert {f"benchmarks.{name}" for name in named} == {p for p in _programs() if ".harness." not in p} - parts
 
 

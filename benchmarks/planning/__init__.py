@@ -1,0 +1,1 @@
+"""How well activities and primitives are planned and carried out."""

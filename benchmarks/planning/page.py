@@ -1,0 +1,270 @@
+"""`docs/notes/planned_activities.md`: which activities are solved on which rung, from rows of `activities.py`.
+
+    python -m benchmarks.planning.page --rows FOLDER     takes rows in, in place of what is known of their activities
+    python -m benchmarks.planning.page                   writes the page from what was taken in before
+
+What is taken in is one line for each activity in benchmarks/results/planning/<rung>.jsonl.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import json
+import pathlib
+import statistics
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from benchmarks.harness.paths import RESULTS, ROOT
+from benchmarks.planning.activities import RUNGS, read_rows
+from ig2mj.planning.steps import PRIMITIVES, REASONS
+
+FOLDER = RESULTS / "planning"
+PAGE = ROOT / "docs" / "notes" / "planned_activities.md"
+ENOUGH = 0.8
+"""Share of starts with which an activity counts as solved."""
+SHOWN = 2
+"""Reasons of failure in a row of the page."""
+
+Row = dict[str, Any]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
+    )
+    parser.add_argument("--rows", type=pathlib.Path, nargs="*", default=(), help="folders of `activities.py --out`")
+    parser.add_argument("--results", type=pathlib.Path, default=FOLDER)
+    parser.add_argument("--page", type=pathlib.Path, default=PAGE)
+    args = parser.parse_args()
+    for rung in RUNGS:
+        files = [file for folder in args.rows if (file := folder / f"{rung}.jsonl").is_file()]
+        if files:
+            take_in(read_rows(files), args.results / f"{rung}.jsonl")
+    kept = {rung: read_lines(args.results / f"{rung}.jsonl") for rung in RUNGS}
+    args.page.write_text(page(kept), encoding="utf-8")
+    print(args.page)
+
+
+# From rows of episodes to a line for each activity.
+
+
+def take_in(rows: Sequence[Row], file: pathlib.Path) -> None:
+    """Replaces the lines of the rows' activities."""
+    known = {line["activity"]: line for line in read_lines(file)}
+    by_activity: dict[str, list[Row]] = {}
+    for row in rows:
+        by_activity.setdefault(row["activity"], []).append(row)
+    known |= {name: condensed(name, found) for name, found in by_activity.items()}
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text("".join(json.dumps(known[name]) + "\n" for name in sorted(known)), encoding="utf-8")
+
+
+def read_lines(file: pathlib.Path) -> list[Row]:
+    """Lines of a file of results; none where it is not there."""
+    if not file.is_file():
+        return []
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
+
+
+def condensed(name: str, rows: Sequence[Row]) -> Row:
+    """The episodes of an activity as one line.
+
+    Raises:
+      ValueError: the rows are of more than one protocol.
+    """
+    conditions = {json.dumps(row["conditions"], sort_keys=True) for row in rows}
+    if len(conditions) > 1:
+        raise ValueError(f"{name}: rows of different conditions: {' and '.join(sorted(conditions))}")
+    rows = sorted(rows, key=lambda row: row["start"])
+    steps = [step for row in rows for step in row["steps"]]
+    primitives = {}
+    for primitive in dict.fromkeys(s["primitive"] for s in steps):
+        own = [s for s in steps if s["primitive"] == primitive]
+        done = [s for s in own if not s["reason"]]
+        reasons = collections.Counter(s["reason"] for s in own if s["reason"])
+        primitives[primitive] = {
+            "tried": len(own),
+            "first": sum(s["attempts"] == 1 for s in done),
+            "done": len(done),
+            "reasons": dict(reasons.most_common()),
+        }
+    return {
+        "activity": name,
+        "home": next((row["home"] for row in rows if row["home"]), ""),
+        "conditions": rows[0]["conditions"],
+        "starts": [row["start"] for row in rows],
+        "success": [int(row["success"]) for row in rows],
+        "q": [round(row["q"], 3) for row in rows],
+        "planned": [row["planned"] for row in rows],
+        "replans": [row["replans"] for row in rows],
+        "time": [round(row["time"], 1) for row in rows],
+        "processor": [row["processor"] for row in rows],
+        "crashed": sum(row["crashed"] for row in rows),
+        "ended": dict(collections.Counter(row["ended"] for row in rows if not row["success"]).most_common()),
+        "primitives": primitives,
+        "commits": sorted({row["commit"] for row in rows}),
+        "commands": sorted({row["command"] for row in rows}),
+        "dates": sorted({row["date"] for row in rows}),
+        "versions": rows[-1]["versions"],
+    }
+
+
+# From lines to the page.
+
+
+def page(kept: dict[str, list[Row]]) -> str:
+    """The page's text."""
+    kept = {rung: lines for rung, lines in kept.items() if lines}
+    conditions = next((lines[0]["conditions"] for lines in kept.values()), {})
+    lines = [
+        "# BEHAVIOR's activities, planned and carried out",
+        "",
+        "Written by `python -m benchmarks.planning.page` from rows of `python -m benchmarks.planning.activities`;",
+        f"not by hand. Start states: split `{conditions.get('split')}`. Robot: {conditions.get('robot')}, with",
+        "assisted grasping and the simulator's state as observation. Doors between rooms that the goal does not name",
+        f"are {conditions.get('doors')} at the start. Native engine, one thread. An episode is *solved* if the goal",
+        "holds at its end; *q* is its partial credit ([planning](../guide/planning.md#results)). The rungs are",
+        "*symbolic* (states are set), *kinematic* (motion is planned and checked, states are set) and *physics* (the",
+        "robot acts).",
+        "",
+        "## Rungs",
+        "",
+        *_rungs(kept),
+        "",
+        "*demonstrations an hour*: solved episodes in an hour of one core's processor time, planning included.",
+        "",
+        "## Activities",
+        "",
+        "Solved starts of all, and mean q. *steps*: of the first plan, median. *simulated*: seconds of an episode in",
+        "physics, median. *failures*: primitives that failed most often on the highest rung, with the reason and how",
+        "often, or why episodes ended.",
+        "",
+        *_activities(kept),
+        "",
+        "## Primitives within the activities",
+        "",
+        "*first try*, *with retries*: share of the steps that end with success.",
+        "",
+        *_primitives(kept),
+        "",
+        "## Provenance",
+        "",
+        *_provenance(kept),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """`head`: titles; ">" before one sets its column flush right."""
+    titles = [h.removeprefix(">") for h in head]
+    marks = ["--:" if h.startswith(">") else "---" for h in head]
+    return [_line(titles), "|" + "|".join(marks) + "|", *map(_line, rows)]
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %"
+
+
+def _share(line: Row) -> float:
+    return sum(line["success"]) / len(line["success"])
+
+
+def _rungs(kept: dict[str, list[Row]]) -> list[str]:
+    head = (
+        "rung", ">activities", ">starts",
+        f">solved in at least {100 * ENOUGH:.0f} % of starts", ">at least once",
+        ">mean success", ">mean q", ">demonstrations an hour", ">crashed",
+    )  # fmt: skip
+    rows = []
+    for rung, lines in kept.items():
+        spent = sum(sum(line["processor"]) for line in lines)
+        solved = sum(sum(line["success"]) for line in lines)
+        rows.append(
+            (
+                rung,
+                str(len(lines)),
+                str(sum(len(line["starts"]) for line in lines)),
+                str(sum(_share(line) >= ENOUGH for line in lines)),
+                str(sum(any(line["success"]) for line in lines)),
+                _percent(statistics.mean(map(_share, lines))),
+                f"{statistics.mean(statistics.mean(line['q']) for line in lines):.3f}",
+                f"{3600 * solved / spent:.0f}" if spent else "-",
+                str(sum(line["crashed"] for line in lines)),
+            )
+        )
+    return _table(head, rows)
+
+
+def _activities(kept: dict[str, list[Row]]) -> list[str]:
+    by_rung = {rung: {line["activity"]: line for line in lines} for rung, lines in kept.items()}
+    names = sorted({name for lines in by_rung.values() for name in lines})
+    head = ["activity", "home", ">steps"]
+    for rung in kept:
+        head += [f">{rung}", ">q"]
+    head += [">simulated", "failures"]
+    rows = []
+    for name in names:
+        lines = [by_rung[rung].get(name) for rung in kept]
+        there = [line for line in lines if line is not None]
+        planned = [n for line in there for n in line["planned"] if n]
+        cells = [name, next((x["home"] for x in there if x["home"]), "-")]
+        cells.append(f"{statistics.median(planned):g}" if planned else "-")
+        for line in lines:
+            if line is None:
+                cells += ["-", "-"]
+            else:
+                cells += [f"{sum(line['success'])} of {len(line['success'])}", f"{statistics.mean(line['q']):.2f}"]
+        physics = by_rung.get("physics", {}).get(name)
+        times = [t for t in physics["time"] if t] if physics else []
+        cells += [f"{statistics.median(times):.0f}" if times else "-", _failures(there[-1])]
+        rows.append(cells)
+    return _table(head, rows)
+
+
+def _failures(line: Row) -> str:
+    if all(line["success"]):
+        return ""
+    found = [
+        (count, f"{primitive}: {reason} ({count})")
+        for primitive, own in line["primitives"].items()
+        for reason, count in own["reasons"].items()
+    ]
+    said = [text for _, text in sorted(found, key=lambda pair: -pair[0])[:SHOWN]]
+    return "; ".join(said or list(line["ended"])[:1]).replace("|", "/")
+
+
+def _primitives(kept: dict[str, list[Row]]) -> list[str]:
+    reasons = list(REASONS)
+    head = ["rung", "primitive", ">steps", ">first try", ">with retries", *(f">{reason}" for reason in reasons)]
+    rows = []
+    for rung, lines in kept.items():
+        for primitive in PRIMITIVES:
+            own = [line["primitives"][primitive] for line in lines if primitive in line["primitives"]]
+            tried = sum(one["tried"] for one in own)
+            if tried:
+                counts = [sum(one["reasons"].get(reason, 0) for one in own) for reason in reasons]
+                share = [_percent(sum(one[key] for one in own) / tried) for key in ("first", "done")]
+                rows.append([rung, primitive, str(tried), *share, *(str(n) if n else "" for n in counts)])
+    return _table(head, rows)
+
+
+def _provenance(kept: dict[str, list[Row]]) -> list[str]:
+    rows = []
+    for rung, lines in kept.items():
+        for key in ("commits", "commands", "dates"):
+            found = sorted({value for line in lines for value in line[key]})
+            rows.append((rung, key, ", ".join(f"`{value}`" for value in found)))
+        versions = sorted({f"{name} {value}" for line in lines for name, value in line["versions"].items()})
+        rows.append((rung, "versions", ", ".join(versions)))
+    return _table(("rung", "of the rows", ""), rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,108 @@
+"""Solves some starts of an activity and reports each; `benchmarks.planning.activities` runs many of these.
+
+    python -m benchmarks.planning.worker making_tea --rung symbolic --starts 0 1 2
+
+Without `--starts` it samples the activity's start states, which are kept (`Problem.pool`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+import traceback
+import warnings
+from typing import Any
+
+from ig2mj.cli.common.solving import Options, StepTable, solved
+from ig2mj.cluster.reporting import end_with_parent, report
+from ig2mj.errors import Ig2mjError
+from ig2mj.planning.domain import Domain
+from ig2mj.planning.problem import Problem, problem_of
+from ig2mj.planning.results import row_of
+from ig2mj.planning.task_planner import TaskPlanner
+
+SAMPLED_TOGETHER = 10
+"""Start states that are kept on disk together while they are sampled."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("activity")
+    parser.add_argument("--rung", default="physics")
+    parser.add_argument("--starts", type=int, nargs="*", default=(), help="numbers of start states")
+    parser.add_argument("--count", type=int, default=1, help="start states that the pool should have")
+    parser.add_argument("--split", default="held_out")
+    parser.add_argument("--robot", default="humanoid")
+    parser.add_argument("--doors", choices=("open", "shut"), default="open")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="wall time of an episode")
+    parser.add_argument("--child", action="store_true", help="end with the process that started this one")
+    args = parser.parse_args()
+    if args.child:
+        end_with_parent()
+    warnings.simplefilter("ignore")
+    problem = problem_of(args.activity)
+    if not args.starts:
+        sample(problem, args.split, args.count)
+        return
+    solve_starts(problem, args)
+
+
+def sample(problem: Problem, split: str, count: int) -> None:
+    """Samples start states, and reports how many there are each time that some more are kept."""
+    for wanted in [*range(SAMPLED_TOGETHER, count, SAMPLED_TOGETHER), count]:
+        pool = problem.pool(split, wanted)
+        size = count if pool is None else pool.size
+        report(event="pool", size=min(size, count), home=problem.scene.name)
+        if size < wanted:
+            return
+
+
+def solve_starts(problem: Problem, args: argparse.Namespace) -> None:
+    """Solves the starts one after another. An error of one is its result."""
+    from ig2mj.agents.registry import make_robot
+
+    planner = TaskPlanner(Domain(problem.model, make_robot(args.robot).hand_count), problem.goal)
+    left = list(args.starts)
+    pool = problem.pool(args.split, max(args.count, max(left) + 1))
+    options = Options(
+        robot=args.robot,
+        worlds=1,
+        symbolic=args.rung == "symbolic",
+        doors_open=args.doors == "open",
+        seed=args.seed,
+        seconds=args.seconds,
+        record=None,
+        video=None,
+    )
+    reporter = _Reporter(problem.name, silent=True)
+    while left:
+        began = time.process_time()
+        try:
+            for number, result in solved(problem, planner, pool, tuple(left), options, reporter):
+                left.remove(number)
+                spent = round(time.process_time() - began, 2)
+                report(event="row", start=number, home=problem.scene.name, processor=spent, result=row_of(result))
+                began = time.process_time()
+            return  # starts that are left have no row of the pool
+        except (Exception, MemoryError) as e:
+            why = " ".join(str(e).split()) if isinstance(e, Ig2mjError) else f"{type(e).__name__}: {e}"
+            traceback.print_exc()
+            report(event="failed", start=left.pop(0), home=problem.scene.name, why=why)
+
+
+class _Reporter(StepTable):
+    """Reports what begins."""
+
+    number = -1
+
+    def begin(self, number: int) -> None:
+        self.number = number
+        report(event="begin", start=number)
+
+    def watch(self, world: int, plan: Any, records: Any) -> None:
+        report(event="step", start=self.number, step=str(plan.steps[0]) if plan.steps else "")
+
+
+if __name__ == "__main__":
+    main()
