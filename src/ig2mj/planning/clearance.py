@@ -8,6 +8,7 @@ Axes: K pieces, N planes, M points.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 from collections.abc import Collection, Sequence
@@ -45,37 +46,102 @@ def _planes(tables: SceneTables) -> Float[np.ndarray, "K N 4"]:
     return np.concatenate([normal, planes[..., 3:] + np.einsum("kni,ki->kn", normal, tables.piece_pos)[..., None]], -1)
 
 
+@functools.lru_cache(maxsize=4)
+def _corners(tables: SceneTables) -> Float[np.ndarray, "K V 3"]:
+    """Vertices of all pieces in the frames of their bodies."""
+    own = matrices_on_host(tables.piece_quat)
+    return np.einsum("kij,kvj->kvi", own, tables.piece_vertices) + tables.piece_pos[:, None]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Placed:
+    """Pieces of one world: half-spaces and boxes, world frame; `pose` of each body when they were placed."""
+
+    pose: Float[np.ndarray, "B 7"]
+    normal: Float[np.ndarray, "K N 3"]
+    offset: Float[np.ndarray, "K N"]
+    low: Float[np.ndarray, "K 3"]
+    high: Float[np.ndarray, "K 3"]
+
+
+class PlacedPieces:
+    """The pieces of the worlds of one scene where they were last asked for; only what has moved is placed again."""
+
+    def __init__(self, scene: Scene):
+        self._tables = scene.tables
+        self._of_world: dict[int, _Placed] = {}
+
+    def of(self, view: PhysicsView, world: int) -> _Placed:
+        """The pieces of a world as they are in a view."""
+        pos, quat = (np.asarray(a)[world].astype(float) for a in (view.body_pos, view.body_quat))
+        pose = np.concatenate([pos, quat], axis=1)
+        tables, old = self._tables, self._of_world.get(world)
+        body = tables.piece_body
+        moved = np.arange(len(body)) if old is None else np.flatnonzero((pose != old.pose).any(1)[body])
+        if old is not None and not len(moved):
+            return old
+        turn, where = matrices_on_host(quat[body[moved]]), pos[body[moved]]
+        planes = _planes(tables)[moved]
+        normal = np.einsum("kij,knj->kni", turn, planes[..., :3])
+        # A plane (0, 0, 0, 1) is padding: its distance is -1, which never is the largest.
+        offset = planes[..., 3] + np.einsum("kni,ki->kn", normal, where)
+        corners = np.einsum("kij,kvj->kvi", turn, _corners(tables)[moved]) + where[:, None]
+        new = normal, offset, corners.min(1), corners.max(1)
+        if old is not None:
+            kept = [a.copy() for a in (old.normal, old.offset, old.low, old.high)]
+            for whole, part in zip(kept, new, strict=True):
+                whole[moved] = part
+            new = kept
+        self._of_world[world] = placed = _Placed(pose, *new)
+        return placed
+
+
 class Obstacles:
     """The pieces of one world, but for those of some objects."""
 
-    def __init__(self, scene: Scene, view: PhysicsView, world: int = 0, without: Collection[int] = ()):
-        tables = scene.tables
-        keep = np.flatnonzero((tables.piece_object >= 0) & ~np.isin(tables.piece_object, list(without)))
-        body = tables.piece_body[keep]
-        pos = np.asarray(view.body_pos)[world, body].astype(float)
-        turn = matrices_on_host(np.asarray(view.body_quat)[world, body])
-        planes = _planes(tables)[keep]
-        self._normal = np.einsum("kij,knj->kni", turn, planes[..., :3])
-        self._offset = planes[..., 3] + np.einsum("kni,ki->kn", self._normal, pos)
-        # A plane (0, 0, 0, 1) is padding: its distance is -1, which never is the largest.
-        own = matrices_on_host(tables.piece_quat[keep])
-        corners = np.einsum("kij,kvj->kvi", own, tables.piece_vertices[keep]) + tables.piece_pos[keep][:, None]
-        corners = np.einsum("kij,kvj->kvi", turn, corners) + pos[:, None]
-        self._low, self._high = corners.min(1), corners.max(1)
-        self.objects = tables.piece_object[keep]
+    def __init__(
+        self,
+        scene: Scene,
+        view: PhysicsView,
+        world: int = 0,
+        without: Collection[int] = (),
+        pieces: PlacedPieces | None = None,
+    ):
+        """
+        Args:
+          without: numbers of objects. pieces: of the scene, asked before; None: all are placed now.
+        """
+        placed = (pieces or PlacedPieces(scene)).of(view, world)
+        self.objects = scene.tables.piece_object
+        self._keep = (self.objects >= 0) & ~np.isin(self.objects, list(without))
+        self._normal, self._offset, self._low, self._high = placed.normal, placed.offset, placed.low, placed.high
 
     def distance(self, points: Float[np.ndarray, "M 3"]) -> Float[np.ndarray, "M"]:
         """m from points to the nearest piece, at most `FAR`; negative inside."""
         low, high = points.min(0) - FAR, points.max(0) + FAR
-        near = np.flatnonzero(((self._low <= high) & (self._high >= low)).all(1))
+        near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
         if not len(near):
             return np.full(len(points), FAR)
         away = np.einsum("kni,mi->mkn", self._normal[near], points) - self._offset[near]
         return np.minimum(away.max(-1).min(-1), FAR)
 
+    def clear(self, spheres: Float[np.ndarray, "M 4"]) -> bool:
+        """Whether no sphere (x, y, z, radius) enters a piece."""
+        centre, radius = spheres[:, :3], spheres[:, 3:]
+        low, high = (centre - radius).min(0), (centre + radius).max(0)
+        near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
+        if not len(near):
+            return True
+        meets = ((centre - radius)[:, None] < self._high[near]).all(-1)
+        meets &= ((centre + radius)[:, None] > self._low[near]).all(-1)
+        sphere, piece = np.nonzero(meets)
+        piece = near[piece]
+        away = np.einsum("pni,pi->pn", self._normal[piece], centre[sphere]) - self._offset[piece]
+        return bool((away.max(-1, initial=-1.0) >= radius[sphere, 0]).all())
+
     def below(self, xy: Float[np.ndarray, "2"], height: float, of: Collection[int]) -> float:
         """World z of the highest point below a height, over x and y, of some objects; -inf: there is none."""
-        mine = np.flatnonzero(np.isin(self.objects, list(of)) & (self._low[:, 2] < height))
+        mine = np.flatnonzero(self._keep & np.isin(self.objects, list(of)) & (self._low[:, 2] < height))
         best = -np.inf
         for k in mine:
             if (xy < self._low[k, :2]).any() or (xy > self._high[k, :2]).any():
@@ -107,7 +173,7 @@ def straight(
         return True
     points = start + along[:, None] / apart * way
     centres = (points[:, None] + spheres[None, :, :3]).reshape(-1, 3)
-    return bool((obstacles.distance(centres) >= np.tile(spheres[:, 3], len(points))).all())
+    return obstacles.clear(np.column_stack([centres, np.tile(spheres[:, 3], len(points))]))
 
 
 def hand_way(

@@ -16,6 +16,12 @@ from ig2mj.scene.scene import Scene
 LOWEST, SLICE, TOP = 0.05, 0.25, 2.0
 """m: what is lower does not count, since wheels and hovering bodies pass over it; height of a slice; of the top."""
 
+SLICES = np.arange(LOWEST, TOP + SLICE, SLICE)
+"""m: heights at which slices begin and end."""
+
+ROUNDING = 0.005
+"""m to which radii are rounded up, so that a robot whose hands move a little has the same footprint."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Disc:
@@ -84,12 +90,12 @@ def _extent(model: mujoco.MjModel, geom: int, frame: np.ndarray) -> tuple[float,
 
 def _merged(discs: list[Disc]) -> tuple[Disc, ...]:
     """The same as slices of equal height: the widest of each, equal neighbours as one."""
-    edges = np.arange(LOWEST, TOP + SLICE, SLICE)
     found: list[Disc] = []
-    for low, high in itertools.pairwise(edges):
+    for low, high in itertools.pairwise(SLICES):
         radius = max((d.radius for d in discs if d.high > low and d.low < high), default=0.0)
         if radius == 0.0:
             continue
+        radius = float(np.ceil(radius / ROUNDING - 1e-6) * ROUNDING)
         if found and found[-1].high == low and found[-1].radius == radius:
             found[-1] = dataclasses.replace(found[-1], high=float(high))
         else:

@@ -11,12 +11,15 @@ Axes: N points of a way, h and w cells of the map along y and x.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import PhysicsView
+from ig2mj.planning.clearance import Obstacles, PlacedPieces
 from ig2mj.planning.footprint import BaseFootprint
 from ig2mj.planning.occupancy import RESOLUTION, Occupancy, door_objects
 from ig2mj.scene.scene import Scene
@@ -30,6 +33,9 @@ NEAR_GOAL, NEAR_START = 0.15, 0.5
 
 COMFORT, CAUTION = 0.15, 3.0
 """m of spare room from which on a way is not lengthened by nearness, and by how much it is where there is none."""
+
+FLOORS_KEPT = 8
+"""Free floors that are kept with their fields."""
 
 LOOKAHEAD = 120
 """Cells of a way that one straight line may replace."""
@@ -78,6 +84,14 @@ class FreeFloor:
         best = int(np.argmin(apart))
         return cells[best] if apart[best] <= within else None
 
+    def within(self, xy: Point, reach: float) -> Int[np.ndarray, "n 2"]:
+        """Free cells whose middles are within `reach` (m) of a point."""
+        point = np.asarray(xy, float)
+        low = np.clip(self.occupancy.cells(point - reach), 0, self.free.shape)
+        high = np.clip(self.occupancy.cells(point + reach) + 1, 0, self.free.shape)
+        cells = np.argwhere(self.free[low[0] : high[0], low[1] : high[1]]) + low
+        return cells[np.linalg.norm(self.occupancy.middles(cells) - point, axis=1) < reach]
+
     def distances(self, xy: Point, within: float = NEAR_GOAL) -> Float[np.ndarray, "h w"]:
         """m along the floor from each cell to the free one nearest to a point, with the surcharge of narrow places;
         infinite without a way.
@@ -85,43 +99,61 @@ class FreeFloor:
         Args:
           within: m from the point that the free cell is at most.
         """
-        return self._field(xy, within)[0]
+        start = self.nearest(xy, within)
+        return np.full(self.free.shape, np.inf) if start is None else self._field(start)[0]
 
     def way(self, start: Point, goal: Point) -> Float[np.ndarray, "N 2"] | None:
         """Points of a way between two positions, straightened; None where there is none."""
-        begin = self.nearest(start, NEAR_START)
-        if begin is None:
+        begin, end = self.nearest(start, NEAR_START), self.nearest(goal, NEAR_GOAL)
+        if begin is None or end is None:
             return None
-        distance, following = self._field(goal)
-        if not np.isfinite(distance[tuple(begin)]):
+        distance, before = self._field(begin)
+        if not np.isfinite(distance[tuple(end)]):
             return None
-        width, cells = self.free.shape[1], [begin]
-        while (after := following[tuple(cells[-1])]) >= 0:
-            cells.append(np.array(divmod(int(after), width)))
-        return np.concatenate([np.asarray(start, float)[None], self.occupancy.middles(self._straightened(cells))])
+        width, cells = self.free.shape[1], [end]
+        while (cell := before[tuple(cells[-1])]) >= 0:
+            cells.append(np.array(divmod(int(cell), width)))
+        return np.concatenate(
+            [np.asarray(start, float)[None], self.occupancy.middles(self._straightened(np.array(cells[::-1])))]
+        )
 
-    def _field(self, goal: Point, within: float = NEAR_GOAL) -> tuple[Float[np.ndarray, "h w"], Int[np.ndarray, "h w"]]:
-        """Distance of every cell to a goal, and the next cell of the way (row times width and column; -1: none)."""
+    def _field(self, start: Int[np.ndarray, "2"]) -> tuple[Float[np.ndarray, "h w"], Int[np.ndarray, "h w"]]:
+        """Distance of every cell from a free one, and the cell before it on the way (row times width and column; -1:
+        none). The last one is kept: a robot asks for many ways from where it is."""
         from scipy.sparse import csgraph
 
-        number = np.full(self.free.shape, -1)
+        key = (int(start[0]), int(start[1]))
+        if key not in self._fields:
+            places = np.flatnonzero(self.free.ravel())
+            distance, before = np.full(self.free.shape, np.inf), np.full(self.free.shape, -1)
+            away, came = csgraph.dijkstra(
+                self._graph,
+                directed=False,
+                indices=int(np.searchsorted(places, key[0] * self.free.shape[1] + key[1])),
+                return_predecessors=True,
+            )
+            distance.ravel()[places] = away
+            before.ravel()[places] = np.where(came >= 0, places[np.maximum(came, 0)], -1)
+            self._fields.clear()
+            self._fields[key] = distance, before
+        return self._fields[key]
+
+    @functools.cached_property
+    def _fields(self) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
+        return {}
+
+    @functools.cached_property
+    def _graph(self) -> Any:
+        """Steps between free cells; rows are free cells in order."""
         places = np.flatnonzero(self.free.ravel())
+        number = np.full(self.free.shape, -1)
         number.ravel()[places] = np.arange(len(places))
-        distance, following = np.full(self.free.shape, np.inf), np.full(self.free.shape, -1)
-        end = self.nearest(goal, within)
-        if end is None:
-            return distance, following
         graph = FloorMap(self.free, self.occupancy.origin, RESOLUTION).graph(number).tocoo()
         slow = 1 + CAUTION * np.clip(1 - self.spare.ravel()[places] / COMFORT, 0.0, 1.0)
         graph.data = graph.data * (slow[graph.row] + slow[graph.col]) / 2
-        away, before = csgraph.dijkstra(
-            graph.tocsr(), directed=False, indices=int(number[tuple(end)]), return_predecessors=True
-        )
-        distance.ravel()[places] = away
-        following.ravel()[places] = np.where(before >= 0, places[np.maximum(before, 0)], -1)
-        return distance, following
+        return graph.tocsr()
 
-    def _straightened(self, cells: Sequence[Int[np.ndarray, "2"]]) -> Int[np.ndarray, "N 2"]:
+    def _straightened(self, cells: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, "N 2"]:
         """The way without points that a straight line over cells as free as those of the way can do without."""
         kept = [cells[0]]
         k = 0
@@ -133,13 +165,13 @@ class FreeFloor:
             kept.append(cells[k])
         return np.array(kept)
 
-    def _sees(self, one: np.ndarray, other: np.ndarray, between: Sequence[np.ndarray]) -> bool:
+    def _sees(self, one: np.ndarray, other: np.ndarray, between: np.ndarray) -> bool:
         count = 2 * int(np.abs(other - one).max()) + 1
         line = np.round(one + np.linspace(0, 1, count)[:, None] * (other - one)).astype(int)
         rows, columns = line.T
         if not self.free[rows, columns].all():
             return False
-        own = min(COMFORT, float(min(self.spare[tuple(c)] for c in between)))
+        own = min(COMFORT, float(self.spare[tuple(between.T)].min()))
         return bool(self.spare[rows, columns].min() >= own - 1e-9)
 
 
@@ -153,6 +185,8 @@ class MotionPlanner:
     def __init__(self, scene: Scene, agent: int = 0):
         self.scene, self.agent = scene, agent
         self.occupancy = Occupancy(scene)
+        self._pieces = PlacedPieces(scene)
+        self._floors: list[FreeFloor] = []
 
     def floor(
         self,
@@ -169,7 +203,16 @@ class MotionPlanner:
         footprint = footprint or BaseFootprint.of_robot(self.scene, view, self.agent, world)
         held = np.flatnonzero(np.asarray(view.held)[world].any(0)) if np.asarray(view.held).size else np.zeros(0, int)
         free, spare = self.occupancy.free(view, footprint, {*without, *held.tolist()}, world)
-        return FreeFloor(self.occupancy, free, spare)
+        for kept in self._floors:
+            if np.array_equal(kept.spare, spare):
+                return kept
+        floor = FreeFloor(self.occupancy, free, spare)
+        self._floors = [floor, *self._floors[: FLOORS_KEPT - 1]]
+        return floor
+
+    def obstacles(self, view: PhysicsView, without: Collection[int] = (), world: int = 0) -> Obstacles:
+        """What hands keep clear of: pieces of everything but some objects."""
+        return Obstacles(self.scene, view, world, without, self._pieces)
 
     def plan_base(
         self,

@@ -2,14 +2,16 @@
 
 A cell is taken at a height where a convex piece of an object comes nearer than half a cell to its middle. A robot can
 stand where each disc of its footprint is as far from what is taken at its heights as it is wide. Pieces of objects
-that cannot move are drawn once for each range of heights.
+that cannot move are drawn once for each range of heights, others where they have moved.
 
 Axes: K pieces, V vertices, h and w cells along y and x.
 """
 
 from __future__ import annotations
 
+import collections
 import functools
+import itertools
 from collections.abc import Collection
 
 import numpy as np
@@ -17,7 +19,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.footprint import BaseFootprint
+from ig2mj.planning.footprint import SLICES, BaseFootprint
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import SceneTables
 from ig2mj.tasks.task import GROUND
@@ -30,6 +32,9 @@ DIRECTIONS = 16
 
 CLEARANCE = 0.02
 """m between the footprint and what is taken."""
+
+FIELDS_KEPT = 16
+"""Distance transforms that are kept."""
 
 _ANGLES = np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS)
 _NORMALS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)])
@@ -57,6 +62,11 @@ class Occupancy:
             + tables.piece_pos[:, None]
         )
         self._kept: dict[tuple[float, float], np.ndarray] = {}
+        self._drawn: dict[tuple[int, float, float], dict[int, tuple[bytes, np.ndarray]]] = {}
+        self._away: collections.OrderedDict[bytes, np.ndarray] = collections.OrderedDict()
+        self._of_body = {
+            int(b): self._moving[body == b] for body in (tables.piece_body[self._moving],) for b in set(body)
+        }
         start = scene.start_data()
         rotation = np.array(start.xmat).reshape(-1, 3, 3)
         still = np.flatnonzero(self._still | self._floor)
@@ -102,26 +112,57 @@ class Occupancy:
         Args:
           view: with a world axis; `world` of it. without: objects that do not count (those that are held, doors).
         """
-        pieces = self._moving[~np.isin(self.scene.tables.piece_object[self._moving], list(without))]
-        pos = np.asarray(view.body_pos)[world].astype(float)
-        turn = matrices_on_host(np.asarray(view.body_quat)[world])
-        found = self._taken_by_still(low, high).copy()
-        for vertices in self._placed(pieces, pos, turn):
-            self._draw(found, _between(vertices, low, high))
+        found = np.zeros(self.shape, bool)
+        owner, without = self.scene.tables.piece_object, set(without)
+        pose = np.concatenate([np.asarray(view.body_pos)[world], np.asarray(view.body_quat)[world]], axis=1)
+        for band in _bands(low, high):
+            found |= self._taken_by_still(*band)
+            drawn = self._drawn.setdefault((world, *band), {})
+            for body, pieces in self._of_body.items():
+                if int(owner[pieces[0]]) in without:
+                    continue
+                now = pose[body].tobytes()
+                if (before := drawn.get(body)) is None or before[0] != now:
+                    drawn[body] = before = now, self._cells_of(pieces, pose[body].astype(float), *band)
+                found.ravel()[before[1]] = True
         return found
+
+    def _cells_of(self, pieces: np.ndarray, pose: np.ndarray, low: float, high: float) -> Int[np.ndarray, "n"]:
+        """Flat numbers of the cells that pieces of one body take between two heights."""
+        turn = matrices_on_host(pose[None, 3:])[0]
+        vertices = self._vertices[pieces] @ turn.T + pose[:3]
+        z = vertices[..., 2]
+        there = np.flatnonzero((z.min(1) < high) & (z.max(1) > low))
+        if not len(there):
+            return np.zeros(0, int)
+        grid = np.zeros(self.shape, bool)
+        for k in there:
+            self._draw(grid, _between(vertices[k], low, high))
+        return np.flatnonzero(grid)
 
     def free(
         self, view: PhysicsView, footprint: BaseFootprint, without: Collection[int] = (), world: int = 0
     ) -> tuple[Bool[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
         """Where a robot can stand, and how much farther than that it is from what is taken, m."""
-        import scipy.ndimage
-
         spare = np.full(self.shape, np.inf)
         for disc in footprint.discs:
             taken = self.taken(view, disc.low, disc.high, without, world)
-            away = np.asarray(scipy.ndimage.distance_transform_edt(np.pad(~taken, 1, constant_values=True)))
-            spare = np.minimum(spare, away[1:-1, 1:-1] * RESOLUTION - disc.radius - CLEARANCE)
+            spare = np.minimum(spare, self._distance_to(taken) - disc.radius - CLEARANCE)
         return (spare >= 0) & self.floor, spare
+
+    def _distance_to(self, taken: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
+        """m from the middle of each cell to that of the nearest taken one; kept for the grids asked for last."""
+        import scipy.ndimage
+
+        key = np.packbits(taken).tobytes()
+        if key in self._away:
+            self._away.move_to_end(key)
+            return self._away[key]
+        away = np.asarray(scipy.ndimage.distance_transform_edt(np.pad(~taken, 1, constant_values=True)))
+        self._away[key] = found = away[1:-1, 1:-1] * RESOLUTION
+        if len(self._away) > FIELDS_KEPT:
+            self._away.popitem(last=False)
+        return found
 
     def cells(self, xy: Float[np.ndarray, "*n 2"]) -> Int[np.ndarray, "*n 2"]:
         """Row and column of the cells that hold points; may lie outside."""
@@ -162,6 +203,12 @@ def _between(vertices: Float[np.ndarray, "V 3"], low: float, high: float) -> Flo
             cut = below[:, None, :2] + share[..., None] * (above[None, :, :2] - below[:, None, :2])
             found.append(cut.reshape(-1, 2))
     return np.concatenate(found)
+
+
+def _bands(low: float, high: float) -> list[tuple[float, float]]:
+    """A range of heights, cut where footprints are, so that all footprints share what is drawn."""
+    edges = [low, *(e for e in SLICES.tolist() if low < e < high), high]
+    return list(itertools.pairwise(edges))
 
 
 def door_objects(tables: SceneTables) -> Int[np.ndarray, "n"]:

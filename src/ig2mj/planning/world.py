@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_rotate
@@ -35,6 +35,9 @@ HELD_POINTS, HELD_MARGIN = 60, 0.012
 
 BODY = 0.24
 """m from the axis of the body that what is carried is away from."""
+
+APART = 0.12
+"""m between stances for the same point, at least."""
 
 EACH = 3
 """Spots of a placement in each area of its rule."""
@@ -75,6 +78,7 @@ class PlannedWorld:
     query: SceneQuery
     world: int
     rng: np.random.Generator
+    _sensed: tuple[PhysicsView, Senses] | None = dataclasses.field(default=None, init=False)
 
     @property
     def view(self) -> PhysicsView:
@@ -82,7 +86,10 @@ class PlannedWorld:
 
     @property
     def senses(self) -> Senses:
-        return sense(self.view, self.stage.agent, self.body.hands)
+        view = self.view
+        if self._sensed is None or self._sensed[0] is not view:
+            self._sensed = view, sense(view, self.stage.agent, self.body.hands)
+        return self._sensed[1]
 
     @property
     def facts(self) -> Facts:
@@ -128,7 +135,7 @@ class PlannedWorld:
 
     def obstacles(self, without: Collection[str] = ()) -> Obstacles:
         """Pieces of everything but some objects."""
-        return Obstacles(self.stage.scene, self.view, self.world, [self.index(n) for n in without])
+        return self.planner.obstacles(self.view, [self.index(n) for n in without], self.world)
 
     def vertices(self, name: str) -> Float[np.ndarray, "V 3"]:
         """Corners of an object's collision pieces, world frame."""
@@ -209,11 +216,7 @@ class PlannedWorld:
 
     def reaches(self, hand: int, stance: Stance, point: Vector) -> bool:
         """Whether a hand reaches a point from a stance."""
-        c, s = np.cos(stance.yaw), np.sin(stance.yaw)
-        x, y, z = self.body.shoulders[hand]
-        height = float(self.senses.base_pos[self.world, 2])
-        shoulder = np.array([stance.xy[0] + c * x - s * y, stance.xy[1] + s * x + c * y, height + z])
-        return bool(np.linalg.norm(point - shoulder) <= self.body.reach)
+        return bool(self._reach_from(hand, np.array([stance.xy]), np.array([stance.yaw]), point)[0])
 
     def stances(self, hand: int, point: Vector, floor: FreeFloor, away: float, most: int = 10) -> Iterator[Stance]:
         """Where the robot can stand so that a hand reaches a point, the nearest and most comfortable first.
@@ -222,30 +225,30 @@ class PlannedWorld:
           away: m, horizontal, that the base would like to be from the point.
         """
         here, _ = self.base
-        cells = np.argwhere(floor.free)
-        if not len(cells):
-            return
+        cells = floor.within(point[:2], self.body.reach)
         middles = floor.occupancy.middles(cells)
-        apart = np.linalg.norm(middles - point[:2], axis=1)
-        near = np.flatnonzero(apart < self.body.reach)
-        field = floor.distances(here, NEAR_START)
-        way = field[tuple(cells[near].T)]
-        cost = 0.6 * way + 2.0 * np.abs(apart[near] - away) - 0.5 * np.minimum(floor.spare[tuple(cells[near].T)], 0.2)
-        order = near[np.argsort(cost)]
-        order = order[np.isfinite(np.sort(cost))]
-        taken: list[np.ndarray] = []
-        for k in order:
-            if any(np.linalg.norm(middles[k] - t) < 0.12 for t in taken):
-                continue
-            offset = point[:2] - middles[k]
-            side = self.body.carry[hand][1] * 0.6
-            yaw = float(np.arctan2(offset[1], offset[0]) - np.arctan2(side, max(apart[k], 0.3)))
-            stance = Stance((float(middles[k][0]), float(middles[k][1])), yaw)
-            if self.reaches(hand, stance, point):
-                taken.append(middles[k])
-                yield stance
-                if len(taken) >= most:
-                    return
+        offset = point[:2] - middles
+        apart = np.linalg.norm(offset, axis=1)
+        side = self.body.carry[hand][1] * 0.6
+        yaw = np.arctan2(offset[:, 1], offset[:, 0]) - np.arctan2(side, np.maximum(apart, 0.3))
+        way = floor.distances(here, NEAR_START)[tuple(cells.T)]
+        cost = 0.6 * way + 2.0 * np.abs(apart - away) - 0.5 * np.minimum(floor.spare[tuple(cells.T)], 0.2)
+        cost[~self._reach_from(hand, middles, yaw, point)] = np.inf
+        for _ in range(most):
+            if not len(cost) or not np.isfinite(cost[best := int(np.argmin(cost))]):
+                return
+            cost[np.linalg.norm(middles - middles[best], axis=1) < APART] = np.inf
+            yield Stance((float(middles[best][0]), float(middles[best][1])), float(yaw[best]))
+
+    def _reach_from(
+        self, hand: int, xy: Float[np.ndarray, "n 2"], yaw: Float[np.ndarray, "n"], point: Vector
+    ) -> Bool[np.ndarray, "n"]:
+        """Whether a hand reaches a point from each of some stances."""
+        x, y, z = self.body.shoulders[hand]
+        c, s = np.cos(yaw), np.sin(yaw)
+        height = np.full(len(xy), float(self.senses.base_pos[self.world, 2]) + z)
+        shoulder = np.stack([xy[:, 0] + c * x - s * y, xy[:, 1] + s * x + c * y, height], axis=1)
+        return np.linalg.norm(point - shoulder, axis=1) <= self.body.reach
 
     def dirt(self, predicate: str, name: str) -> list[DirtSpot]:
         """Particles that are left on an object: of dust for "dusty", of stains for "stained"; the nearest first."""

@@ -18,6 +18,7 @@ from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.batch import Batch
 
 if TYPE_CHECKING:
     from ig2mj.simulation.simulation import Simulation
@@ -28,6 +29,7 @@ class SimulationStage:
 
     def __init__(self, simulation: Simulation, agent: int = 0):
         self._simulation, self.agent = simulation, agent
+        self._seen: tuple[Batch, PhysicsView] | None = None  # the view, and the batch that it is of
         controllers = simulation.core.controllers
         self.controller: Controller = next(c for c in controllers if c.agent == agent)
         before = sum(c.action_size for c in controllers if c.agent < agent)
@@ -47,7 +49,10 @@ class SimulationStage:
 
     @property
     def view(self) -> PhysicsView:
-        return self._simulation.view
+        batch = self._simulation._batch
+        if self._seen is None or self._seen[0] is not batch:
+            self._seen = batch, self._simulation.view
+        return self._seen[1]
 
     @property
     def states(self) -> ExtendedStates:
