@@ -36,6 +36,9 @@ RUNGS = ("symbolic", "kinematic", "physics")
 TOGETHER = {"symbolic": 20, "kinematic": 10, "physics": 5}
 """Starts that one process solves, one after another."""
 
+FEW = 4
+"""Processes with which an activity is finished before the next; with more, all start states are sampled first."""
+
 CONDITIONS = ("rung", "robot", "split", "doors", "seed")
 """Arguments that a row holds, and by which it is found again."""
 
@@ -90,7 +93,8 @@ class _Run:
         self.began = time.monotonic()
         self.made_by = {**provenance(), "versions": versions()}
         self.lock = threading.Lock()
-        self.jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
+        few = args.jobs <= FEW
+        self.jobs: queue.Queue[_Job | None] = queue.LifoQueue() if few else queue.Queue()
         self.open_jobs = 0
         self.counts: collections.Counter[str] = collections.Counter()
         kept = [row for row in read_rows([self.file]) if row["conditions"] == self.conditions]
@@ -99,9 +103,9 @@ class _Run:
         self.done = {(row["activity"], row["start"]) for row in kept}
 
     def all(self) -> None:
-        for name in self.names:
-            if any((name, n) not in self.done for n in range(self.args.starts)):
-                self.put(_Job(name))
+        missing = [name for name in self.names if any((name, n) not in self.done for n in range(self.args.starts))]
+        for name in missing if self.args.jobs > FEW else reversed(missing):
+            self.put(_Job(name))
         workers = max(1, self.args.jobs)
         if not self.open_jobs:
             print("all rows are there")

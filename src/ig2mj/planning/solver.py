@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ig2mj.planning.readings import quality
+from ig2mj.planning.quality import quality
 from ig2mj.planning.rung import Rung
 from ig2mj.planning.steps import Outcome, PlanningError, Step
 from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
@@ -36,7 +36,7 @@ class EpisodeResult:
     """What became of one episode.
 
     Attributes:
-      success: the goal holds at the end. q: partial credit (`ig2mj.planning.readings.quality`).
+      success: the goal holds at the end. q: partial credit (`ig2mj.planning.quality.quality`).
       steps: in order. replans: plans that are not the rest of the plan before. planned: steps of the first plan.
       seconds: wall time. time: simulated seconds. ended: why it ended without success, in words, else "".
     """

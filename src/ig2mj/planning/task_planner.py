@@ -1,7 +1,7 @@
 """`TaskPlanner`: from a goal to ordered steps, by regression over literals.
 
 The goal is ground: quantifiers stand for the scene's objects. `plan` takes the cheapest reading of the goal
-(`ig2mj.planning.readings`), and for each of its literals that is false the steps that make it true and those that
+(`ig2mj.predicates.cheapest`), and for each of its literals that is false the steps that make it true and those that
 they need first: what shuts an object in is opened, a tap runs before a tool is soaked, a tool is soaked before it
 scrubs. Literals are ordered by what depends on what:
 
@@ -25,9 +25,9 @@ import numpy as np
 
 from ig2mj.planning.domain import SYMMETRIC, Domain, condition_of
 from ig2mj.planning.facts import Facts
-from ig2mj.planning.readings import cheapest
 from ig2mj.planning.steps import PlanningError, Step
 from ig2mj.predicates import logic
+from ig2mj.predicates.cheapest import cheapest
 from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.predicates.logic import Atom
 from ig2mj.sampling.conditions import Condition

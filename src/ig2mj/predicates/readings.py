@@ -2,7 +2,7 @@
 
 `(exists (?d - dish) (inside apple_0 ?d))` has one reading for each dish. A reading says what must hold of which
 objects, so that it can be sampled or planned for. Pairs of `ForPairs` are read as matchings: each object takes part in
-one pair.
+one pair. `ig2mj.predicates.cheapest` finds the reading of least cost without a search.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from ig2mj.predicates.logic import And, Atom, Exactly, Expression, Not, Or, Pairing
 
-Literals = dict[Atom, bool]
-"""Atoms, and which truth each must have."""
+Reading = dict[Atom, bool]
+"""Atoms, and the truth that each must have."""
 
 Accepts = Callable[[Mapping[Atom, bool], Atom, bool], bool]
 """Whether a literal can be added to those that are chosen."""
@@ -33,7 +33,7 @@ Ranking = Callable[[Sequence[Expression], bool], Sequence[Expression]]
 """Options, and the truth that one or some of them shall have; the same options, the best first."""
 
 
-def readings(expression: Expression, accepts: Accepts = anything, rank: Ranking = keep_order) -> Iterator[Literals]:
+def readings(expression: Expression, accepts: Accepts = anything, rank: Ranking = keep_order) -> Iterator[Reading]:
     """Readings of a ground expression, depth first; no literal of a reading contradicts another.
 
     Args:
@@ -49,7 +49,7 @@ class _Search:
     def __init__(self, accepts: Accepts, rank: Ranking):
         self.accepts, self.rank = accepts, rank
 
-    def made(self, e: Expression, value: bool, chosen: Literals) -> Iterator[Literals]:
+    def made(self, e: Expression, value: bool, chosen: Reading) -> Iterator[Reading]:
         """All ways to extend the chosen literals so that the expression has this truth."""
         match e:
             case Atom():
@@ -78,7 +78,7 @@ class _Search:
             case _:
                 raise TypeError(f"{e!r} is not a ground expression")
 
-    def every(self, parts: Sequence[tuple[Expression, bool]], chosen: Literals) -> Iterator[Literals]:
+    def every(self, parts: Sequence[tuple[Expression, bool]], chosen: Reading) -> Iterator[Reading]:
         if not parts:
             yield chosen
             return
@@ -86,7 +86,7 @@ class _Search:
         for extended in self.made(first, value, chosen):
             yield from self.every(rest, extended)
 
-    def exactly(self, count: int, parts: Sequence[Expression], chosen: Literals) -> Iterator[Literals]:
+    def exactly(self, count: int, parts: Sequence[Expression], chosen: Reading) -> Iterator[Reading]:
         if count > len(parts):
             return
         ranked = self.rank(parts, True)
@@ -94,8 +94,8 @@ class _Search:
             yield from self.every([(p, n in some) for n, p in enumerate(ranked)], chosen)
 
     def matched(
-        self, count: int, rows: Sequence[Sequence[Expression | None]], taken: frozenset[int], chosen: Literals
-    ) -> Iterator[Literals]:
+        self, count: int, rows: Sequence[Sequence[Expression | None]], taken: frozenset[int], chosen: Reading
+    ) -> Iterator[Reading]:
         """`count` of the rows, each with a column of its own."""
         if count == 0:
             yield chosen
@@ -109,30 +109,10 @@ class _Search:
                 yield from self.matched(count - 1, rest, taken | {free[part]}, extended)
         yield from self.matched(count, rest, taken, chosen)
 
-    def unmatched(
-        self, count: int, rows: Sequence[Sequence[Expression | None]], chosen: Literals
-    ) -> Iterator[Literals]:
+    def unmatched(self, count: int, rows: Sequence[Sequence[Expression | None]], chosen: Reading) -> Iterator[Reading]:
         """So few rows, or so few columns, with a part that holds, that there are not `count` of them."""
         columns = tuple(zip(*rows, strict=True))
         for lines in (rows, columns):
             fewest = len(lines) - count + 1
             for some in itertools.combinations(lines, max(fewest, 0)):
                 yield from self.every([(p, False) for line in some for p in line if p is not None], chosen)
-
-
-def fewest_changes(expression: Expression, value: bool, holds: Callable[[Atom], bool]) -> int:
-    """A lower bound of how many literals must change so that a ground expression has a truth."""
-    match expression:
-        case Atom():
-            return int(holds(expression) != value)
-        case Not(part):
-            return fewest_changes(part, not value, holds)
-        case And(parts) | Or(parts):
-            counts = [fewest_changes(p, value, holds) for p in parts]
-            return sum(counts) if isinstance(expression, And) == value else min(counts, default=0)
-        case Exactly(count, parts) if value:
-            return abs(count - sum(fewest_changes(p, True, holds) == 0 for p in parts))
-        case Pairing(count, rows) if value:
-            best = sorted(min((fewest_changes(p, True, holds) for p in r if p is not None), default=0) for r in rows)
-            return sum(best[:count])
-    return 0

@@ -23,8 +23,9 @@ from ig2mj.cluster.job_runner import Where
 from ig2mj.cluster.jobs import Job, JobSet, WholeRunError
 from ig2mj.cluster.journal import Journal
 from ig2mj.errors import EngineError, StateError
+from ig2mj.predicates.cheapest import cheapest
 from ig2mj.predicates.logic import Atom, Expression
-from ig2mj.predicates.readings import Literals, fewest_changes, readings
+from ig2mj.predicates.readings import Reading, readings
 from ig2mj.process import entry_point
 from ig2mj.sampling.conditions import MUTUAL, Condition
 from ig2mj.sampling.many import Sampled, make_sampler, packed_row, sample_row, sampled_rows
@@ -194,7 +195,7 @@ class GoalSampler:
             left = end - time.process_time()
             if left <= 0:
                 break
-            literals = self.reading(truth, rng, cheapest=attempt == 1)
+            literals = self.reading(truth, rng, few_changes=attempt == 1)
             if literals is None:
                 rejected["no reading of the goal is possible"] += 1
                 break
@@ -210,13 +211,13 @@ class GoalSampler:
                 rejected["goal false although its reading holds"] += 1
         return GoalState(None, rejected, attempt, reading)
 
-    def reading(self, truth: Mapping[Atom, bool], rng: np.random.Generator, cheapest: bool) -> Literals | None:
+    def reading(self, truth: Mapping[Atom, bool], rng: np.random.Generator, few_changes: bool) -> Reading | None:
         """A reading of the goal at random, each object in one place if there is such a reading; None: there is none.
 
         Args:
-          truth: of the goal's atoms in the start. cheapest: alternatives that change least come first.
+          truth: of the goal's atoms in the start. few_changes: alternatives that change least come first.
         """
-        return choose_reading(self._goal.ground, truth, rng, cheapest, self._fixed)
+        return choose_reading(self._goal.ground, truth, rng, few_changes, self._fixed)
 
     def _with_help(self, reading: tuple[Condition, ...]) -> tuple[tuple[Condition, ...], tuple[str, ...]]:
         """A reading with what makes it easier: containers stand open, and loose supports are put down flat.
@@ -247,7 +248,7 @@ class GoalSampler:
         world = world_of(self.sampler.query, row.states)
         return dict(zip(self._goal.atoms, np.asarray(self._goal.literals_of(world))[0].tolist(), strict=True))
 
-    def _conditions(self, literals: Literals) -> tuple[Condition, ...]:
+    def _conditions(self, literals: Reading) -> tuple[Condition, ...]:
         """Literals as conditions; where a whole is to be cut, those about its place are of its halves."""
         index = {name: n for n, name in enumerate(self.model.tables.object_names)}
         names = self.model.tables.object_names
@@ -269,22 +270,25 @@ def choose_reading(
     goal: Expression,
     truth: Mapping[Atom, bool],
     rng: np.random.Generator,
-    cheapest: bool,
+    few_changes: bool,
     fixed: frozenset[str] = frozenset(),
-) -> Literals | None:
+) -> Reading | None:
     """See `GoalSampler.reading`. `goal`: ground. `fixed`: objects that cannot be moved."""
 
     def rank(options: Sequence[Expression], value: bool) -> list[Expression]:
         shuffled = [options[n] for n in rng.permutation(len(options))]
-        if not cheapest:
+        if not few_changes:
             return shuffled
-        return sorted(shuffled, key=lambda e: fewest_changes(e, value, truth.__getitem__))
+        return sorted(shuffled, key=lambda e: cheapest(e, changes, value)[0])
 
     def possible(chosen: Mapping[Atom, bool], atom: Atom, value: bool) -> bool:
         if truth[atom] == value or len(atom.arguments) == 1:
             return True
         first, second = atom.arguments
         return first != second and (first not in fixed or (atom.predicate in MUTUAL and second not in fixed))
+
+    def changes(atom: Atom, value: bool) -> float:
+        return float(truth[atom] != value) if possible({}, atom, value) else math.inf
 
     looked_at = itertools.count()
 

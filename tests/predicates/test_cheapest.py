@@ -1,4 +1,4 @@
-"""Ground readings of a goal, and q, the partial credit of an episode."""
+"""The ground reading of least cost."""
 
 import itertools
 import math
@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from ig2mj.planning.readings import cheapest, quality
+from ig2mj.predicates.cheapest import cheapest
 from ig2mj.predicates.explain import value_of
 from ig2mj.predicates.logic import And, Atom, Exactly, Not, Or, Pairing
 
@@ -57,21 +57,3 @@ def test_a_pairing_is_the_cheapest_assignment():
     cost, reading = cheapest(pairing, lambda atom, wanted: float(price[tuple(map(int, atom.arguments))]))
     best = min(sum(price[i, j] for i, j in enumerate(order)) for order in itertools.permutations(range(3)))
     assert cost == best == 6 and reading == {cells[0, 1]: True, cells[1, 0]: True, cells[2, 2]: True}
-
-
-def test_q_counts_what_was_gained_less_what_was_lost():
-    start = {A: False, B: False, C: True, D: False}
-    goal = And((A, B, C, D))
-    assert quality(goal, start, start) == 0
-    assert quality(goal, start, start | {A: True}) == pytest.approx(1 / 3)
-    assert quality(goal, start, start | {A: True, B: True, C: False}) == pytest.approx(1 / 3)
-    assert quality(goal, start, start | {C: False}) == 0
-    assert quality(goal, start, dict.fromkeys(ATOMS, True)) == 1
-
-
-def test_q_is_that_of_the_best_alternative():
-    start = dict.fromkeys(ATOMS, False)
-    goal = And((Or((And((A, B)), And((C, D)))),))
-    assert quality(goal, start, start | {A: True}) == pytest.approx(0.5)
-    assert quality(Or((And((A, B, C)), D)), start, start | {A: True, B: True}) == pytest.approx(2 / 3)
-    assert quality(Or((A, B)), {A: True, B: False}, {A: True, B: False}) == 1

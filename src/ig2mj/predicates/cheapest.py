@@ -1,26 +1,21 @@
-"""Ground readings: sets of literals that make a ground expression true; the cheapest one, and q, the partial credit.
+"""The ground reading of an expression that costs least, found directly: no readings are enumerated.
 
-A disjunction, an `exists` or a pairing leaves a choice of what to make true. A planner takes the choice that costs
-least, and q of an episode (`quality`) is taken over all choices.
+A disjunction is its cheaper part, an `Exactly` the parts whose truth gains most, a `Pairing` an assignment of least
+cost. `ig2mj.predicates.readings` enumerates readings, for demands on what is chosen together.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ig2mj.predicates.logic import And, Atom, Exactly, Expression, Not, Or, Pairing
+from ig2mj.predicates.readings import Reading
 
 Cost = Callable[[Atom, bool], float]
 """What it costs that an atom is true, or false; infinite where that cannot be."""
-
-Reading = dict[Atom, bool]
-"""The truth of each atom that a choice needs."""
-
-ROUNDS = 20
-"""Of the search for the largest quotient in `quality`; each round improves it, and three are usual."""
 
 FORBIDDEN = 1e9
 """Cost in an assignment of a pair that cannot be."""
@@ -99,41 +94,3 @@ def _unpaired(count: int, rows: Sequence[Sequence[Expression | None]], cost: Cos
     empty = [_together([cheapest(p, cost, False) for p in row if p is not None]) for row in rows]
     wanted = max(len(rows) - count + 1, 0)
     return _together(sorted(empty, key=lambda choice: choice[0])[:wanted])
-
-
-def quality(expression: Expression, start: Mapping[Atom, bool], end: Mapping[Atom, bool]) -> float:
-    """q of an episode: the largest value, over all readings of the goal, of
-
-        (literals false at the start and true at the end - those true at the start and false at the end)
-        / literals false at the start,
-
-    at least 0; 1 if nothing was false at the start. "True" is as the reading wants it.
-
-    Args:
-      expression: ground. start, end: truth of each atom.
-    """
-
-    def counts(reading: Reading) -> tuple[int, int]:
-        wrong = [a for a, wanted in reading.items() if start[a] != wanted]
-        gained = sum(end[a] == reading[a] for a in wrong)
-        lost = sum(start[a] == wanted != end[a] for a, wanted in reading.items())
-        return gained - lost, len(wrong)
-
-    best = 0.0
-    for _ in range(ROUNDS):  # a quotient is largest where gain - quotient * wrong has the maximum 0 (Dinkelbach)
-
-        def price(atom: Atom, wanted: bool, quotient: float = best) -> float:
-            if start[atom] == wanted:
-                return 0.0 if end[atom] == wanted else 1.0
-            return quotient - (1.0 if end[atom] == wanted else 0.0)
-
-        value, reading = cheapest(expression, price)
-        if math.isinf(value):
-            return 0.0
-        gained, wrong = counts(reading)
-        if not wrong:
-            return 1.0 if not gained else max(best, 0.0)
-        if gained / wrong <= best + 1e-9:
-            break
-        best = gained / wrong
-    return min(best, 1.0)
