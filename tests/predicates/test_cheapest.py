@@ -57,3 +57,30 @@ def test_a_pairing_is_the_cheapest_assignment():
     cost, reading = cheapest(pairing, lambda atom, wanted: float(price[tuple(map(int, atom.arguments))]))
     best = min(sum(price[i, j] for i, j in enumerate(order)) for order in itertools.permutations(range(3)))
     assert cost == best == 6 and reading == {cells[0, 1]: True, cells[1, 0]: True, cells[2, 2]: True}
+
+
+def test_parts_that_would_contradict_each_other_take_the_next_best():
+    price = {A: 1.0, B: 4.0, C: 1.0, D: 2.0}
+    goal = And((Or((A, B)), Or((And((C, Not(A))), And((D, Not(A))))), Or((A, C))))
+    assert cheapest(goal, lambda atom, wanted: price[atom] if wanted else 0.0) == (6.0, {B: True, C: True, A: False})
+    assert math.isinf(cheapest(And((A, Not(A))), lambda atom, wanted: 0.0)[0])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_reading_is_found_exactly_where_the_goal_can_be_true(seed):
+    rng = random.Random(seed)
+    for _ in range(40):
+        goal = random_goal(rng)
+        price = {a: rng.randint(0, 9) for a in ATOMS}
+
+        def cost(atom, wanted, price=price):
+            return float(price[atom] * wanted)
+
+        value, reading = cheapest(goal, cost)
+        true = [
+            t for values in itertools.product((False, True), repeat=4)
+            if value_of(goal, t := dict(zip(ATOMS, values, strict=True)))
+        ]  # fmt: skip
+        assert math.isinf(value) == (not true)
+        if true:
+            assert sum(cost(a, w) for a, w in reading.items()) >= min(sum(price[a] * t[a] for a in ATOMS) for t in true)

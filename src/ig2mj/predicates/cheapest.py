@@ -1,13 +1,17 @@
 """The ground reading of an expression that costs least, found directly: no readings are enumerated.
 
 A disjunction is its cheaper part, an `Exactly` the parts whose truth gains most, a `Pairing` an assignment of least
-cost. `ig2mj.predicates.readings` enumerates readings, for demands on what is chosen together.
+cost. Where parts that must hold together want an atom both true and false, the search branches on that atom.
+`ig2mj.predicates.readings` enumerates readings, for demands on what is chosen together.
 """
 
 from __future__ import annotations
 
+import heapq
+import itertools
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +24,21 @@ Cost = Callable[[Atom, bool], float]
 FORBIDDEN = 1e9
 """Cost in an assignment of a pair that cannot be."""
 
+BRANCHES = 400
+"""Branches of a search after which a contradiction stands."""
+
+
+class _Choice(NamedTuple):
+    """A reading of a part. `cost`: of its literals, each use of one. `clash`: an atom that is wanted both true and
+    false, so that the cost is a lower bound."""
+
+    cost: float
+    reading: Reading
+    clash: Atom | None = None
+
+
+NOTHING = _Choice(math.inf, {})
+
 
 def cheapest(expression: Expression, cost: Cost, wanted: bool = True) -> tuple[float, Reading]:
     """The reading of least cost, and that cost; infinite, with the reading of what fits, where there is none.
@@ -27,70 +46,98 @@ def cheapest(expression: Expression, cost: Cost, wanted: bool = True) -> tuple[f
     Args:
       expression: ground. cost: of literals; may be negative. Each use of a literal counts.
     """
+    first = _choice(expression, cost, wanted)
+    if first.clash is None:
+        return first.cost, first.reading
+    numbers = itertools.count()
+    queue: list[tuple[float, int, dict[Atom, bool], _Choice]] = [(first.cost, next(numbers), {}, first)]
+    for _ in range(BRANCHES):
+        if not queue or math.isinf(queue[0][0]):
+            break
+        value, _, settled, found = heapq.heappop(queue)
+        if found.clash is None:
+            return value, found.reading
+        for truth in (True, False):
+            own = {**settled, found.clash: truth}
+            choice = _choice(expression, _given(cost, own), wanted)
+            heapq.heappush(queue, (choice.cost, next(numbers), own, choice))
+    return math.inf, first.reading
+
+
+def _given(cost: Cost, settled: Reading) -> Cost:
+    """`cost`, where the truth of some atoms is settled."""
+    return lambda atom, wanted: math.inf if settled.get(atom, wanted) != wanted else cost(atom, wanted)
+
+
+def _choice(expression: Expression, cost: Cost, wanted: bool) -> _Choice:
+    """The choice of least cost, where contradictions between parts cost nothing."""
     match expression:
         case Atom():
-            return cost(expression, wanted), {expression: wanted}
+            return _Choice(cost(expression, wanted), {expression: wanted})
         case Not(part):
-            return cheapest(part, cost, not wanted)
+            return _choice(part, cost, not wanted)
         case And(parts) | Or(parts):
-            found = [cheapest(p, cost, wanted) for p in parts]
+            found = [_choice(p, cost, wanted) for p in parts]
             if isinstance(expression, And) == wanted:
                 return _together(found)
-            return min(found, key=lambda choice: choice[0]) if found else (math.inf, {})
+            return _least(found)
         case Exactly(count, parts):
             if wanted:
                 return _exactly(count, parts, cost)
-            others = [n for n in range(len(parts) + 1) if n != count]
-            choices = [_exactly(n, parts, cost) for n in others]
-            return min(choices, key=lambda choice: choice[0]) if choices else (math.inf, {})
+            return _least([_exactly(n, parts, cost) for n in range(len(parts) + 1) if n != count])
         case Pairing(count, rows):
             return _paired(count, rows, cost) if wanted else _unpaired(count, rows, cost)
     raise TypeError(f"{expression!r} is not a ground expression")
 
 
-def _together(found: Sequence[tuple[float, Reading]]) -> tuple[float, Reading]:
-    """All of them; infinite where two of them want an atom otherwise."""
-    total, reading = 0.0, {}
-    for value, part in found:
-        if any(reading.get(atom, truth) != truth for atom, truth in part.items()):
-            value = math.inf
-        total += value
-        reading.update(part)
-    return total, reading
+def _least(choices: Sequence[_Choice]) -> _Choice:
+    """The cheapest; of equally cheap ones one without a contradiction."""
+    return min(choices, key=lambda choice: (choice.cost, choice.clash is not None), default=NOTHING)
 
 
-def _exactly(count: int, parts: Sequence[Expression], cost: Cost) -> tuple[float, Reading]:
-    true, false = [cheapest(p, cost, True) for p in parts], [cheapest(p, cost, False) for p in parts]
+def _together(found: Sequence[_Choice]) -> _Choice:
+    """All of them."""
+    total, reading, clash = 0.0, {}, None
+    for part in found:
+        clash = clash or part.clash
+        clash = clash or next((a for a, truth in part.reading.items() if reading.get(a, truth) != truth), None)
+        total += part.cost
+        reading.update(part.reading)
+    return _Choice(total, reading, clash)
+
+
+def _exactly(count: int, parts: Sequence[Expression], cost: Cost) -> _Choice:
+    true, false = [_choice(p, cost, True) for p in parts], [_choice(p, cost, False) for p in parts]
     if count > len(parts):
-        return math.inf, {}
+        return NOTHING
 
     def gain(i: int) -> float:
         """By how much its truth is cheaper than its falsehood."""
-        if math.isinf(true[i][0]):
+        if math.isinf(true[i].cost):
             return math.inf
-        return -math.inf if math.isinf(false[i][0]) else true[i][0] - false[i][0]
+        return -math.inf if math.isinf(false[i].cost) else true[i].cost - false[i].cost
 
     order = sorted(range(len(parts)), key=gain)
     chosen = set(order[:count])
     return _together([true[i] if i in chosen else false[i] for i in range(len(parts))])
 
 
-def _paired(count: int, rows: Sequence[Sequence[Expression | None]], cost: Cost) -> tuple[float, Reading]:
+def _paired(count: int, rows: Sequence[Sequence[Expression | None]], cost: Cost) -> _Choice:
     import scipy.optimize
 
     if not count:
-        return 0.0, {}
-    cells = [[(math.inf, {}) if p is None else cheapest(p, cost, True) for p in row] for row in rows]
-    table = np.array([[min(value, FORBIDDEN) for value, _ in row] for row in cells], float).reshape(len(rows), -1)
+        return _Choice(0.0, {})
+    cells = [[NOTHING if p is None else _choice(p, cost, True) for p in row] for row in rows]
+    table = np.array([[min(cell.cost, FORBIDDEN) for cell in row] for row in cells], float).reshape(len(rows), -1)
     pairs = list(zip(*scipy.optimize.linear_sum_assignment(table), strict=True))
     pairs = sorted(pairs, key=lambda pair: table[pair])[:count]
     if len(pairs) < count:
-        return math.inf, {}
+        return NOTHING
     return _together([cells[i][j] for i, j in pairs])
 
 
-def _unpaired(count: int, rows: Sequence[Sequence[Expression | None]], cost: Cost) -> tuple[float, Reading]:
+def _unpaired(count: int, rows: Sequence[Sequence[Expression | None]], cost: Cost) -> _Choice:
     """So many rows without a true part that fewer than `count` are left."""
-    empty = [_together([cheapest(p, cost, False) for p in row if p is not None]) for row in rows]
+    empty = [_together([_choice(p, cost, False) for p in row if p is not None]) for row in rows]
     wanted = max(len(rows) - count + 1, 0)
-    return _together(sorted(empty, key=lambda choice: choice[0])[:wanted])
+    return _together(sorted(empty, key=lambda choice: choice.cost)[:wanted])
