@@ -2,8 +2,8 @@
 
     env = ig2mj.make("activity/cleaning_up_after_a_meal", robot="fetch")
 
-The home is the shipped one in which the least has to be added, of those that have room for it. Start states are sampled on first use and kept. The
-robot starts on free floor, as near as it can be to what the activity is about.
+The home is the shipped one in which the least has to be added, of those that have room for it. Start states are
+sampled on first use and kept. The robot starts on free floor, as near as it can be to what the activity is about.
 """
 
 from __future__ import annotations
