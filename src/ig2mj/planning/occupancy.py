@@ -30,6 +30,9 @@ RESOLUTION, MARGIN = 0.05, 0.5
 DIRECTIONS = 16
 """Sides of the polygons by which pieces are drawn, at most."""
 
+SEAM = 0.001
+"""m beyond its edge that a floor still counts, so that no gap stays where the floors of two rooms meet."""
+
 CLEARANCE = 0.02
 """m between the footprint and what is taken."""
 
@@ -87,13 +90,13 @@ class Occupancy:
 
     @functools.cached_property
     def floor(self) -> Bool[np.ndarray, "h w"]:
-        """Cells over the home's floor; all, where it has none."""
+        """Cells whose middles are over the home's floor; all, where it has none. Floors of rooms that meet are one."""
         pieces = [self._placed_still[k] for k in np.flatnonzero(self._floor).tolist()]
         if not pieces:
             return np.ones(self.shape, bool)
         found = np.zeros(self.shape, bool)
         for vertices in pieces:
-            self._draw(found, vertices[:, :2], -RESOLUTION / 2)
+            self._draw(found, vertices[:, :2], SEAM)
         return found
 
     def _taken_by_still(self, low: float, high: float) -> Bool[np.ndarray, "h w"]:
