@@ -19,6 +19,7 @@ from ig2mj.agents.humanoid.frames import HAND_POS, HAND_QUAT, HAND_REACH, SHOULD
 from ig2mj.agents.task_robot import HandControl, TaskRobot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.host_rotations import (
+    cross,
     length,
     matrix_to_quat,
     quat_conjugate,
@@ -183,6 +184,8 @@ class HoveringBody(_Body):
         action[:, self._places(*_BODY)] = self._base(senses, rows)
         for number, control in enumerate(self._controls):
             mine = rows["hand"] == number
+            if not mine.any():
+                continue
             move, turn = self._hand(senses, rows, number)
             action[:, self._places(*control.move)] = np.where(mine[:, None], move, 0.0)
             action[:, self._places(*control.turn)] = np.where(mine[:, None], turn, 0.0)
@@ -206,9 +209,8 @@ class HoveringBody(_Body):
         share = np.where(moves, np.minimum(1.0, speed / np.maximum(apart, 1e-6)), 0.0)
         rise = UPRIGHT * (self._stands - senses.base_pos[:, 2])
         move = np.concatenate([share[:, None] * offset, np.clip(rise, -0.05, 0.05)[:, None]], axis=1)
-        up = np.array([0.0, 0.0, 1.0], np.float32)
-        axis = np.asarray(quat_rotate(senses.base_quat, np.broadcast_to(up, move.shape)))
-        turn = UPRIGHT * np.cross(axis, up)
+        up = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), move.shape)
+        turn = UPRIGHT * cross(quat_rotate(senses.base_quat, up), up)
         turn[:, 2] = np.clip(left, -TURN_STEP, TURN_STEP)
         own = [np.asarray(quat_rotate_inverse(senses.base_quat, v.astype(np.float32))) for v in (move, turn)]
         return np.concatenate(own, axis=1)

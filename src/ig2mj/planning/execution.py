@@ -29,12 +29,14 @@ class Carry:
 
     Attributes:
       programs: of all worlds. phase: number of the present one. steps: agent steps in it. status: of each world.
+      rows: the present phases.
     """
 
     programs: Programs
     phase: Int[np.ndarray, "W"]
     steps: Int[np.ndarray, "W"]
     status: Int[np.ndarray, "W"]
+    rows: Rows
 
     @property
     def running(self) -> Bool[np.ndarray, "W"]:
@@ -50,7 +52,8 @@ def begin(programs: Sequence[Sequence[Phase]]) -> Carry:
     """Programs at their start; an empty one is done."""
     packed = Programs.pack(programs)
     zero = np.zeros(len(programs), np.int32)
-    return Carry(packed, zero, zero, np.where(packed.length > 0, RUNNING, DONE).astype(np.int32))
+    status = np.where(packed.length > 0, RUNNING, DONE).astype(np.int32)
+    return Carry(packed, zero, zero, status, packed.at(zero))
 
 
 def begin_some(carry: Carry, programs: Sequence[Sequence[Phase] | None], kept: Sequence[Sequence[Phase]]) -> Carry:
@@ -61,12 +64,9 @@ def begin_some(carry: Carry, programs: Sequence[Sequence[Phase] | None], kept: S
     """
     fresh = begin([kept[w] if p is None else p for w, p in enumerate(programs)])
     new = np.array([p is not None for p in programs])
-    return Carry(
-        fresh.programs,
-        np.where(new, 0, carry.phase),
-        np.where(new, 0, carry.steps),
-        np.where(new, fresh.status, carry.status),
-    )
+    phase = np.where(new, 0, carry.phase)
+    status = np.where(new, fresh.status, carry.status)
+    return Carry(fresh.programs, phase, np.where(new, 0, carry.steps), status, fresh.programs.at(phase))
 
 
 def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Float[np.ndarray, "W n"], Carry]:
@@ -76,7 +76,7 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
       view: of the present physics. Worlds whose programs have ended get an action that leaves everything as it is.
     """
     senses = sense(view, agent, body.hands)
-    rows = carry.programs.at(carry.phase)
+    rows = carry.rows
     there, lost = _ended(body, senses, rows), _lost(senses, rows)
     there &= carry.steps >= np.where(rows["close"] >= 0, SETTLING, 0)
     late = carry.steps >= rows["limit"]
@@ -88,8 +88,8 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     phase = np.where(forward, carry.phase + 1, carry.phase)
     finished = forward & (phase >= carry.programs.length)
     status = np.where(running & (failed > 0), failed, np.where(finished, DONE, carry.status))
-    new = Carry(carry.programs, phase, np.where(forward, 0, carry.steps + 1), status.astype(np.int32))
-    rows = new.programs.at(new.phase)
+    rows = carry.programs.at(phase) if forward.any() else rows
+    new = Carry(carry.programs, phase, np.where(forward, 0, carry.steps + 1), status.astype(np.int32), rows)
     going = new.running
     still = {**rows, "base": np.where(going, rows["base"], Base.STAY), "hand": np.where(going, rows["hand"], -1)}
     return body.command(senses, still).astype(np.float32), new
@@ -107,6 +107,8 @@ def _ended(body: Body, senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
     pos, quat = goals_of_hand(senses, rows)
     for number in range(len(body.hands)):
         mine = rows["hand"] == number
+        if not mine.any():
+            continue
         grip = grip_of(senses, number, body.grips[number])
         near = np.linalg.norm(pos - grip, axis=1) < rows["tolerance"]
         angle = np.asarray(rotation_angle(senses.hand_quat[:, number], quat))
