@@ -20,6 +20,7 @@ from .base.outcome import CheckResult, ConversionOutcome
 from .bodies.joint_rules import openable_ends
 from .checks.run import run_checks
 from .checks.still import SourceBox
+from .hulls.insides import add_insides
 from .mjcf.model_builder import ModelBuilder
 from .mjcf.scene import HOVERS
 from .model_task import BuiltModel
@@ -61,6 +62,7 @@ def finish(
       warnings: about the whole scene.
     """
     checks: list[CheckResult] = []
+    add_insides(manifest, model)
     check_manifest(manifest)
     if options.report or options.strict:
         start = time.perf_counter()

@@ -66,6 +66,7 @@ CONVERTER_LAYERS = [
     "conversion",
     "convert_mjcf_robot",
     "convert_robot",
+    "upgrade",
 ]
 MOST_LINES, MOST_COLLABORATORS = 600, 32
 """Of a module: lines, and modules of ours that it imports. Both are far above the median: a module that reaches them

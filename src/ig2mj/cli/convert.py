@@ -168,7 +168,36 @@ def convert_robot(
     return status
 
 
-SUBCOMMANDS = {"scene": convert_scene, "object": convert_object, "robot": convert_robot, "dataset": convert_dataset}
+def upgrade(
+    folder: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")], json: Flag = False
+) -> None:
+    """Bring converted scenes and objects to the present format: add the inside of their containers.
+
+    Only manifests are changed. Physics stays the same, so that pools and recordings remain valid.
+
+    Args:
+      folder: a converted scene or object, or a folder that holds some.
+      json: print JSON instead of a line.
+    """
+    from ig2mj_converters.upgrade import upgrade_folders
+
+    from ig2mj.cli.common.printing import add_bar, print_json, progress_bar
+
+    with progress_bar() as bar:
+        done = upgrade_folders(folder, add_bar(bar, "finding insides"))
+    if json:
+        print_json({"folders": done.folders, "upgraded": done.upgraded, "containers": done.containers})
+    else:
+        print(f"{folder}: {done.upgraded} of {done.folders} manifests upgraded, {done.containers} containers in all")
+
+
+SUBCOMMANDS = {
+    "scene": convert_scene,
+    "object": convert_object,
+    "robot": convert_robot,
+    "dataset": convert_dataset,
+    "upgrade": upgrade,
+}
 
 
 @contextlib.contextmanager

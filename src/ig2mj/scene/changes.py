@@ -23,6 +23,7 @@ from ig2mj.errors import Ig2mjError, UnknownNameError
 from ig2mj.scene.additions import Addition
 from ig2mj.scene.library import LibraryModel, find_model, folder_of
 from ig2mj.scene.manifest import BUILDING, Manifest, ObjectEntry
+from ig2mj.scene.substance_requests import is_substances
 
 SUPPORTING = 0.5
 """Least vertical part of a contact's normal (unit vector) by which one object bears the other."""
@@ -91,8 +92,8 @@ def changes_of(remove: str | Iterable[str] = (), replace: Mapping[str, str | os.
 
 
 def added(wanted: Iterable[object]) -> list:
-    """Of values of `objects` those that are objects to add, and no changes."""
-    return [text for text in wanted if read_change(text) is None]
+    """Of values of `objects` those that are objects to add, and neither changes nor substances."""
+    return [text for text in wanted if read_change(text) is None and not is_substances(text)]
 
 
 @dataclasses.dataclass(frozen=True)

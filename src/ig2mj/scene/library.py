@@ -21,7 +21,7 @@ from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
 from ig2mj.scene import own_libraries, paths
 from ig2mj.scene.manifest import Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.paths import MANIFEST_FILE
-from ig2mj.scene.physics_digest import physics_digest
+from ig2mj.scene.physics_digest import physics_digest, without_insides
 
 FOLDER = "objects"
 MODEL_FILE = "object.xml"
@@ -85,7 +85,7 @@ class LibraryModel:
     def sha256(self) -> str:
         """Of all that the object depends on: its MJCF, whose meshes and textures are named by their content, and its
         entries in the manifest. The version of the converter is not part of it."""
-        entries = msgspec.json.encode(self.manifest.objects)
+        entries = msgspec.json.encode(without_insides(self.manifest))
         return hashlib.sha256(self.file.read_bytes() + entries).hexdigest()
 
     @functools.cached_property

@@ -7,6 +7,7 @@ metres; masses kilograms; joint positions radians or metres.
 from __future__ import annotations
 
 import collections
+import math
 import os
 import pathlib
 from typing import Any
@@ -16,7 +17,15 @@ import msgspec
 from ig2mj.errors import ManifestError
 from ig2mj.files.content import read_struct
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+"""Version 2 has the inside of containers (`InsideEntry`)."""
+
+MAX_CORNERS = 64
+"""Of an inside, and of its rim."""
+
+READABLE = (1, FORMAT_VERSION)
+UPGRADE = "ig2mj convert upgrade"
+"""Command that adds what version 1 lacks."""
 
 Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
@@ -65,6 +74,18 @@ class PartEntry(msgspec.Struct):
     quat: Quat
 
 
+class InsideEntry(msgspec.Struct):
+    """What a container holds: the convex inside of its base body, in that body's frame, m.
+
+    `litres` are what it holds when it stands. `vertices` are corners of the inside. `rim` goes round its opening,
+    convex and flat; what stands higher than the lowest corner of the rim flows out.
+    """
+
+    litres: float
+    vertices: list[Vec3]
+    rim: list[Vec3]
+
+
 BUILDING = frozenset({"walls", "floors", "ceilings"})
 """Categories of the house itself. They are objects of a scene, but a home is not said to have them."""
 
@@ -94,6 +115,7 @@ class ObjectEntry(msgspec.Struct, omit_defaults=True):
     parked: bool = False  # starts on the parking slab outside the house, not in use
     assisted_grasp: bool = True  # avg_category_specs' enable_ag
     object_scope: str | None = None  # BDDL instances this object is bound to, as in the source
+    inside: InsideEntry | None = None  # of a container; None: it holds nothing
     state: dict[str, Any] = {}  # initial extended state, where the source had one; keys as ig2mj names states
 
     @property
@@ -142,6 +164,7 @@ class Manifest(msgspec.Struct, omit_defaults=True):
     rooms: RoomsEntry = msgspec.field(default_factory=RoomsEntry)
     agents: list[AgentEntry] = []
     task: dict[str, Any] | None = None
+    substances: list[str] = []  # in use, by the names of `ig2mj.knowledge.substances`
 
 
 def load_manifest(path: str | os.PathLike) -> Manifest:
@@ -172,10 +195,10 @@ def save_manifest(manifest: Manifest, path: str | os.PathLike) -> None:
 
 def check_manifest(manifest: Manifest, file: object = "manifest.json") -> None:
     """Checks what the schema cannot say: version, unique names, references between objects. Raises ManifestError."""
-    if manifest.format_version != FORMAT_VERSION:
+    if manifest.format_version not in READABLE:
         raise ManifestError(
             file,
-            f"has format version {manifest.format_version}, this ig2mj reads {FORMAT_VERSION}",
+            f"has format version {manifest.format_version}, this ig2mj reads {' and '.join(map(str, READABLE))}",
             element="format_version",
             fix="convert the scene again",
         )
@@ -188,6 +211,8 @@ def check_manifest(manifest: Manifest, file: object = "manifest.json") -> None:
         element = f"object '{o.name}'"
         if not o.bodies:
             raise ManifestError(file, "has no bodies", element=element)
+        if o.inside is not None:
+            _check_inside(o.inside, element, file)
         joints = {j.name for j in o.joints}
         for part in o.parts:
             if part.object not in known:
@@ -200,3 +225,12 @@ def check_manifest(manifest: Manifest, file: object = "manifest.json") -> None:
         for kind, link in o.links.items():
             if (link.site is None) == (link.geom is None):
                 raise ManifestError(file, f"link '{kind}' needs exactly one of site and geom", element=element)
+
+
+def _check_inside(inside: InsideEntry, element: str, file: object) -> None:
+    numbers = [inside.litres, *(v for corner in (*inside.vertices, *inside.rim) for v in corner)]
+    if len(inside.vertices) < 4 or len(inside.rim) < 3 or inside.litres <= 0 or not all(map(math.isfinite, numbers)):
+        problem = "has an inside without litres, four corners, or three corners of a rim"
+        raise ManifestError(file, problem, element=element, fix="convert the scene again")
+    if len(inside.vertices) > MAX_CORNERS or len(inside.rim) > MAX_CORNERS:
+        raise ManifestError(file, f"has an inside with more than {MAX_CORNERS} corners", element=element)

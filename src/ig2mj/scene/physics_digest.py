@@ -15,7 +15,7 @@ from typing import Any
 
 import msgspec
 
-from ig2mj.scene.manifest import Manifest
+from ig2mj.scene.manifest import Manifest, ObjectEntry
 
 APPEARANCE_ELEMENTS = frozenset(("visual", "material", "texture", "skin", "light", "camera", "default", "mesh"))
 """Elements that are left out. Defaults are merged into the elements that they are of, meshes into their geoms."""
@@ -46,8 +46,13 @@ def physics_digest(file: pathlib.Path, manifest: Manifest) -> str:
     else:
         named = {link.geom for entry in manifest.objects for link in entry.links.values() if link.geom}
         _Reader(root, file.parent, named).feed(hashed)
-    hashed.update(msgspec.json.encode([manifest.objects, manifest.rooms.instances, manifest.task]))
+    hashed.update(msgspec.json.encode([without_insides(manifest), manifest.rooms.instances, manifest.task]))
     return hashed.hexdigest()
+
+
+def without_insides(manifest: Manifest) -> list[ObjectEntry]:
+    """The objects as format version 1 has them: the inside of a container determines no physics."""
+    return [o if o.inside is None else msgspec.structs.replace(o, inside=None) for o in manifest.objects]
 
 
 class _Reader:

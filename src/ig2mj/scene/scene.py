@@ -9,10 +9,12 @@ import hashlib
 import json
 import os
 import pathlib
+import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
+import msgspec
 import mujoco
 
 from ig2mj.cluster.jobs import import_function
@@ -25,7 +27,7 @@ from ig2mj.scene.changes import Change, changes_of, read_change
 from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
 from ig2mj.scene.library import find_model
-from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
+from ig2mj.scene.manifest import FORMAT_VERSION, UPGRADE, AgentEntry, Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.merging import merged_home
 from ig2mj.scene.mjcf_files import read_mjcf
 from ig2mj.scene.mjcf_limits import check_mjcf
@@ -34,8 +36,14 @@ from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
 from ig2mj.scene.physics_digest import physics_digest
 from ig2mj.scene.rooms import Rooms, load_rooms
 from ig2mj.scene.start_overlap import check_start
+from ig2mj.scene.substance_requests import check_substances, read_substances, substances_as_text
 from ig2mj.scene.tables import SceneTables
 from ig2mj.scene.walls import deepen_walls
+
+
+class OldFormatWarning(UserWarning):
+    """A converted scene lacks what a newer format has."""
+
 
 KNOWN_DIGESTS = pathlib.Path(__file__).with_name("known_digests.json")
 """Hash of a scene's physics -> the hash that is in the names and headers of its known pools."""
@@ -81,9 +89,19 @@ class Scene:
     removed: tuple[str, ...] = ()
 
     @property
+    def substances(self) -> tuple[str, ...]:
+        """Names of the substances in use (docs/design/substances.md); empty where none were asked for."""
+        return tuple(self.manifest.substances)
+
+    @property
     def requested(self) -> list[str]:
-        """What `load_scene(objects=...)` takes for its changes and additions."""
-        return [*(change.text for change in self.changes), *(addition.wanted for addition in self.additions)]
+        """What `load_scene(objects=...)` takes for its substances, changes and additions."""
+        return [*self.changes_as_text, *(addition.wanted for addition in self.additions)]
+
+    @property
+    def changes_as_text(self) -> list[str]:
+        """`requested` without the additions."""
+        return [*substances_as_text(self.substances), *(change.text for change in self.changes)]
 
     @property
     def name(self) -> str:
@@ -108,6 +126,9 @@ class Scene:
         for change in self.changes:
             new = "" if change.instead is None else find_model(change.instead).physics_digest
             hashed.update(f"\n{change.name} {new}".encode())
+        if self.substances:
+            insides = [(o.name, o.inside) for o in self.manifest.objects if o.inside is not None]
+            hashed.update(msgspec.json.encode([self.substances, insides]))
         return _known_digests().get(hashed.hexdigest(), hashed.hexdigest())
 
     @functools.cached_property
@@ -200,6 +221,7 @@ def load_scene(
     *,
     remove: str | Sequence[str] = (),
     replace: Mapping[str, str | os.PathLike] | None = None,
+    substances: str | Sequence[str] = (),
 ) -> Scene:
     """Loads a converted scene.
 
@@ -218,17 +240,30 @@ def load_scene(
       replace: objects of the home, and what takes their place and their name: a folder or a name of the object library.
         It is fixed to the house if the old one was. What stood on the old one is put down on the new one where that
         has room for it, and is taken out where not.
+      substances: names of what can fill containers and cover objects, next to those that the manifest names
+        (`ig2mj.knowledge.substances`); "substances:water,salt" in `objects` says the same.
 
     Raises:
       InputError: a file is missing or is not valid MJCF. UnknownNameError: there is no such folder and the library has
-        no such object, or the home has none of this name. Ig2mjError: an object starts inside of something, or a
+        no such object, or the home has none of this name, or there is no such substance.
+        Ig2mjError: an object starts inside of something, or a
         replacement stands in something, or falls.
         ManifestError: a manifest is broken, or does not belong to its MJCF. StateError: no place was found at which the
         predicate holds.
     """
     file = model_file(path)
     home = load_manifest(file.parent / MANIFEST_FILE)
-    changes, requests = _requests([*changes_of(remove, replace), *_listed(objects)])
+    if home.format_version < FORMAT_VERSION:
+        warnings.warn(
+            f"{file.parent}: of an older format, in which containers hold nothing ({UPGRADE} {file.parent})",
+            OldFormatWarning,
+            stacklevel=2,
+        )
+    named, others = read_substances([*substances_as_text(_listed(substances)), *_listed(objects)])
+    if named:
+        home = msgspec.structs.replace(home, substances=list(dict.fromkeys((*home.substances, *named))))
+    check_substances(home.substances)
+    changes, requests = _requests([*changes_of(remove, replace), *others])
     if any(request.predicate for request in requests):
         plan = plan_additions(home, [dataclasses.replace(r, place=None) if r.predicate else r for r in requests])
         names = [addition.name for addition, _ in plan]

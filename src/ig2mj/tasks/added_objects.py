@@ -17,6 +17,7 @@ from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.object_requests import read_request
 from ig2mj.scene.paths import scene_folder
 from ig2mj.scene.scene import Objects
+from ig2mj.scene.substance_requests import is_substances
 from ig2mj.tasks.bddl.task import BddlTask
 from ig2mj.tasks.homes import AnyTask
 from ig2mj.tasks.registry import TASKS
@@ -69,6 +70,8 @@ def object_texts(objects: Objects) -> tuple[str, ...]:
 def _text(wanted: str | os.PathLike) -> str:
     if (change := read_change(wanted)) is not None:
         return change.canonical.text
+    if is_substances(wanted):
+        return str(wanted)
     request = read_request(wanted)
     model = find_model(request.reference)
     return f"{model.reference}{request.text[len(request.reference) :]}" if model.named else request.text

@@ -81,7 +81,7 @@ def save_pool(pool: Pool, file: str | os.PathLike, scene: Scene, note: dict[str,
         "scene": scene.name,
         "digest": scene.digest,
         "additions": entries_of(scene.additions),
-        "changes": [change.text for change in scene.changes],
+        "changes": scene.changes_as_text,
         **plugin_header(pool.states),
     }
     save_tree(file, pool, {**header, **(note or {})})
@@ -134,7 +134,7 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
             raise InputError(file, f"is a pool of scene '{header.get('scene')}', not of '{scene.name}'", fix=fix)
         if [a["name"] for a in header["additions"]] != [a.name for a in scene.additions]:
             raise InputError(file, "was made with other objects added", fix="load the scene with `load_pool_scene`")
-        if header["changes"] != [change.text for change in scene.changes]:
+        if header["changes"] != scene.changes_as_text:
             raise InputError(file, "was made with other changes", fix="load the scene with `load_pool_scene`")
         raise InputError(file, f"was made with another version of the physics of '{scene.name}'", fix=fix)
     arrays = read_arrays(file, "")

@@ -1,5 +1,5 @@
-"""The options `--object`, `--remove` and `--replace` of every command that loads a home, several times each: what is
-added to it, what is taken out of it, and what takes the place of what.
+"""The options `--object`, `--remove`, `--replace` and `--substances` of every command that loads a home, several times
+each: what is added to it, what is taken out of it, what takes the place of what, and what its containers can hold.
 """
 
 from __future__ import annotations
@@ -26,11 +26,12 @@ HELP = (
     "add an object, several times: a folder that `ig2mj convert object` wrote, or a name of the object library "
     "(`ig2mj objects list`), with the place where it starts: obj/mug@on_top:breakfast_table_0, or obj/mug@1,2,0.8,90 "
     "(metres, degrees); docs/guide/objects.md. --remove NAME takes an object of the home out, with what stands on it; "
-    "--replace NAME=DIR|NAME puts another one in its place"
+    "--replace NAME=DIR|NAME puts another one in its place; --substances water,salt lets containers hold them"
 )
 
-CHANGES = ("--remove", "--replace")
-"""Options that are written as values of `--object`: remove:NAME, replace:NAME=MODEL."""
+CHANGES = {"--remove": "NAME", "--replace": "NAME=DIR, or NAME=MODEL", "--substances": "NAME,NAME"}
+"""Options that are written as values of `--object` (remove:NAME, replace:NAME=MODEL, substances:NAME,NAME), and the
+form of their values."""
 
 
 def with_changes(function: Callable[..., Any], args: Sequence[str]) -> list[str]:
@@ -50,8 +51,7 @@ def with_changes(function: Callable[..., Any], args: Sequence[str]) -> list[str]
             continue
         if not equals:
             if not waiting or waiting[0].startswith("--"):
-                form = "NAME" if option == CHANGES[0] else "NAME=DIR, or NAME=MODEL"
-                raise Ig2mjError(f"{option} needs a value: {option} {form}")
+                raise Ig2mjError(f"{option} needs a value: {option} {CHANGES[option]}")
             value = waiting.pop(0)
         out += ["--object", f"{option.removeprefix('--')}:{value}"]
     return out
