@@ -162,7 +162,7 @@ def _pool(
     for top in range(1, shape[2] - 1):
         below = ~solid
         below[:, :, top + 1 :] = False
-        labels, count = scipy.ndimage.label(below)
+        labels, count = _labelled(below)
         if not count:
             continue
         drained = np.unique(np.concatenate([a.ravel() for a in _sides(labels)]))
@@ -177,6 +177,13 @@ def _pool(
     if best is None or best[0] * np.prod(step) < LEAST_SHARE * np.prod(high - low):
         return None
     return _described(best[1], axes, step)
+
+
+def _labelled(cells: np.ndarray) -> tuple[np.ndarray, int]:
+    """Number of the connected part of each cell, 0 for none, and how many there are."""
+    labels = np.zeros(cells.shape, np.int32)
+    count = scipy.ndimage.label(cells, output=labels)
+    return labels, int(np.asarray(count))
 
 
 def _sides(labels: np.ndarray) -> list[np.ndarray]:
