@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import pathlib
-from typing import Annotated, Literal
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.planning import Goal, What
+
+if TYPE_CHECKING:
+    from ig2mj.cli.common.solving import StepTable
+    from ig2mj.planning.physics import PhysicsRung
+    from ig2mj.planning.problem import Problem
+    from ig2mj.planning.solver import EpisodeResult
+    from ig2mj.planning.task_planner import TaskPlanner
 
 
 def run(
@@ -37,7 +45,7 @@ def run(
       goal: an expression, such as "(inside apple_0 fridge_0)"; an activity has its own.
       robot: which robot acts.
       episodes: number of start states, each solved once.
-      worlds: episodes that are solved side by side, in physics.
+      worlds: number of episodes that are solved side by side, in physics.
       rung: physics: the robot acts; symbolic: states are set instead.
       doors: whether doors between rooms that the goal does not name stand open at the start, in physics.
       split: start states of the activity: train or held_out.
@@ -45,22 +53,26 @@ def run(
       seconds: wall time of an episode after which it ends.
       object: with a home: {object}.
       out: file of results, one line of JSON for each episode; episodes that it holds already are not repeated.
-      record: write the episodes as a recording, which replays; with one world.
-      video: write a video (.mp4 or .gif) of the episodes; with one world.
+      record: HDF5 file to record the episodes to, in physics; successful ones are demonstrations (`ig2mj demos`).
+      video: video of the episodes (.mp4, .gif, .webp), or five of its images (.png, .jpg), in physics; of the first
+        world. Needs OpenGL.
       json: print one line of JSON at the end instead of a table.
     """
     import json as json_module
+    import sys
     import time
 
     from ig2mj.cli.common.files import check_output, check_video
     from ig2mj.cli.common.objects import note_changes
     from ig2mj.cli.common.planning import domain_of
-    from ig2mj.cli.common.solving import Options, StepTable, print_figures, print_result, solved
-    from ig2mj.errors import Ig2mjError
+    from ig2mj.cli.common.solving import StepTable, print_figures, print_result
+    from ig2mj.errors import Ig2mjError, UnknownNameError
+    from ig2mj.install_hint import require_module
     from ig2mj.planning.problem import problem_of
     from ig2mj.planning.results import ResultFile
     from ig2mj.planning.solver import summary
     from ig2mj.planning.task_planner import TaskPlanner
+    from ig2mj.tasks.pools import SEEDS
 
     if episodes < 1:
         raise Ig2mjError(f"--episodes {episodes}: at least one is needed")
@@ -68,13 +80,17 @@ def run(
         raise Ig2mjError(f"--seconds {seconds:g}: must be above 0")
     if worlds < 1:
         raise Ig2mjError(f"--worlds {worlds}: at least one is needed")
-    if (record or video) and (worlds > 1 or rung == "symbolic"):
-        raise Ig2mjError("--record and --video need --rung physics and --worlds 1")
+    if split not in SEEDS:
+        raise UnknownNameError("split", split, SEEDS)
+    if (record or video) and rung == "symbolic":
+        raise Ig2mjError("--record and --video are of a robot that acts: use --rung physics")
     for file in (out, record):
         if file is not None:
             check_output(file)
     if video is not None:
-        check_video(video)
+        check_video(video, STRIPS)
+    if record is not None:
+        require_module("h5py")
     began = time.monotonic()
     problem = problem_of(what, goal, object)
     note_changes(problem.scene, object)
@@ -84,17 +100,93 @@ def run(
     conditions |= {"doors": doors} if rung == "physics" else {}
     results = ResultFile(out, conditions)
     wanted = [n for n in range(episodes) if n not in results.kept]
-    if wanted:
-        pool = problem.pool(split, episodes)
-        options = Options(robot, worlds, rung == "symbolic", doors == "open", seed, seconds, record, video)
-        with StepTable(problem.name, silent=json) as table:
-            for number, result in solved(problem, planner, pool, wanted, options, table):
+    if record is not None and len(wanted) < episodes:
+        print(f"{out} holds {episodes - len(wanted)} of the episodes: {record} gets the others", file=sys.stderr)
+    options = {"robot": robot, "worlds": worlds, "split": split, "seed": seed, "doors_open": doors == "open"}
+    try:
+        with StepTable(problem.name) as table:
+            solved = _symbolic if rung == "symbolic" else _physical
+            for number, result in solved(problem, planner, wanted, options, table, seconds, record, video):
                 results.add(number, result)
-    found = [results.kept[n] for n in sorted(results.kept) if n < episodes]
+    except KeyboardInterrupt:
+        kept = [f"{file} holds what was done" for file in (out, record) if file is not None]
+        print("; ".join([f"{len(results.kept)} of {episodes} episodes are done", *kept]), file=sys.stderr)
+        raise
+    numbers = [n for n in sorted(results.kept) if n < episodes]
+    found = [results.kept[n] for n in numbers]
+    if not found:
+        raise Ig2mjError(f"{problem.name}: no start state could be sampled")
+    if len(found) < episodes:
+        print(f"{len(found)} of {episodes} {split} start states could be sampled", file=sys.stderr)
     figures = summary(found, time.monotonic() - began)
     if json:
         print(json_module.dumps(figures))
         return 0 if figures["success_rate"] == 1.0 else 1
-    print_result(f"{problem.name} in {problem.scene.name}, episode {len(found)} of {episodes}", found[-1])
-    print_figures(figures)
+    print_result(f"{problem.name} in {problem.scene.name}, episode {numbers[-1]}", found[-1])
+    print_figures(figures, found)
     return 0 if figures["success_rate"] == 1.0 else 1
+
+
+STRIPS = (".png", ".jpg")
+"""Endings of files that get a few images of a video side by side."""
+
+
+def _symbolic(
+    problem: Problem,
+    planner: TaskPlanner,
+    numbers: Sequence[int],
+    options: dict[str, Any],
+    table: StepTable,
+    seconds: float,
+    *_: object,
+) -> Iterator[tuple[int, EpisodeResult]]:
+    """Episodes in which states are set. `options`: of `ig2mj.demos.solving.Episodes`."""
+    from ig2mj.planning.solver import solve
+    from ig2mj.planning.symbolic import symbolic_episodes
+
+    pool = problem.pool(options["split"], max([0, *numbers]) + 1)
+    for number, rung in symbolic_episodes(planner.domain, problem.scene, pool, numbers, options["seed"]):
+        table.begin([number])
+        yield number, solve(planner, rung, seconds=seconds, watch=table.watch)[0]
+
+
+def _physical(
+    problem: Problem,
+    planner: TaskPlanner,
+    numbers: Sequence[int],
+    options: dict[str, Any],
+    table: StepTable,
+    seconds: float,
+    record: pathlib.Path | None,
+    video: pathlib.Path | None,
+) -> Iterator[tuple[int, EpisodeResult]]:
+    """Episodes in which a robot acts."""
+    import contextlib
+
+    from ig2mj.demos.solving import Episodes
+
+    with contextlib.ExitStack() as files:
+        episodes = files.enter_context(Episodes(problem, planner, numbers, record=record, **options))
+        if not episodes.numbers:
+            return
+        film = None
+        if video is not None:
+            from ig2mj.showcase.plan_video import PlanVideo
+
+            film = PlanVideo(video, episodes.env)
+            files.callback(film.close)
+
+        def begun(numbers: Sequence[int], rung: PhysicsRung) -> None:
+            table.begin(numbers, rung)
+
+            def after_step() -> None:
+                table.tick()
+                if film is not None:
+                    step = rung.running(0)
+                    names = () if step is None else step.arguments
+                    objects = [problem.scene.object_index(n) for n in names if n in problem.scene.object_names]
+                    film.see(episodes.stage.state, "" if step is None else str(step), objects)
+
+            rung.watch = after_step
+
+        yield from episodes.solve(seconds=seconds, watch=table.watch, begun=begun)

@@ -104,6 +104,22 @@ class RecordedEnvironment(Environment):
         state = self._inner.start_from(rows, seed)
         return self._begin(state, np.ones(self.num_worlds, bool), self._seeds(seed), np.asarray(rows))
 
+    def begin_runs(
+        self, state: EnvState, rows: Int[np.ndarray, "W"], worlds: Collection[int] | None = None
+    ) -> EnvState:
+        """Begins runs at a state of the environment that is recorded, such as one of its `resume`.
+
+        Args:
+          rows: of the pool, of all worlds. worlds: in which runs begin; None: all.
+        """
+        mask = np.ones(self.num_worlds, bool) if worlds is None else np.isin(np.arange(self.num_worlds), list(worlds))
+        return self._begin(state, mask, {}, np.asarray(rows))
+
+    def end_run(self, world: int, **attributes: Any) -> None:
+        """Ends the run of a world, if there is one. `attributes`: of the run, such as `success`."""
+        if self.writer is not None:
+            self.writer.end(world, **attributes)
+
     def close(self) -> None:
         """Ends all runs, and closes the file; may be called twice."""
         if self.writer is not None:

@@ -3,6 +3,7 @@
     env = ig2mj.make("CookingMeat", robot="humanoid", worlds=4096)
     env = ig2mj.make("PointNavigation", {"worlds": 16, "sensors": {"scan_rays": 64}})
     env = ig2mj.make("activity/cleaning_up_after_a_meal", ig2mj.EnvConfig(robot="fetch"))
+    env = ig2mj.make("goal/small_home (inside apple_0 fridge_0)", robot="humanoid")
     env = ig2mj.make("my_tasks.py:MugToTable", worlds=64)
 
 `CookingMeat`, `ig2mj/CookingMeat` and `ig2mj/CookingMeat-v0` are the same. `my_tasks.py:MugToTable` imports the file,
@@ -42,6 +43,7 @@ from ig2mj.tasks.homes import AnyTask, in_home
 from ig2mj.tasks.mixing import mixed_pool
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.objective import Objective
+from ig2mj.tasks.own_goal import goal_task, split_goal_name
 from ig2mj.tasks.pools import check_pool
 from ig2mj.tasks.registry import REGISTERED, load_task, split_reference
 from ig2mj.tasks.registry import TASKS as TASK_NAMES
@@ -64,16 +66,20 @@ def list_envs() -> list[str]:
 def is_environment(name: str) -> bool:
     """Whether `make` takes a text for the name of an environment, without a look at what it names."""
     import_files()
-    return short_name(name) is not None or activity_name(name) is not None or split_reference(name) is not None
+    known = (short_name, activity_name, split_goal_name, split_reference)
+    return any(read(name) is not None for read in known)
 
 
 def find_task(name: str) -> AnyTask:
-    """The task of an environment's name: of `list_envs`, "activity/" and one of BEHAVIOR-100's, or "FILE.py:NAME".
+    """The task of an environment's name: of `list_envs`, "activity/" and one of BEHAVIOR-100's, "goal/HOME GOAL", or
+    "FILE.py:NAME".
 
     Raises:
       UnknownNameError: with near matches. For activities also what `bddl_task` raises. InputError: the file cannot be
         imported, or its task is not sound.
     """
+    if (own := split_goal_name(name)) is not None:
+        return goal_task(*own)
     if split_reference(name) is not None:
         return task_of_file(name)
     import_files()
@@ -144,8 +150,9 @@ def make(
     """Makes an environment.
 
     Args:
-      name: of a task (`list_envs`), "activity/" and the name of an activity of BEHAVIOR-100, "FILE.py:NAME" for a task
-        of a file of yours, or the task itself: its class, function or object.
+      name: of a task (`list_envs`), "activity/" and the name of an activity of BEHAVIOR-100, "goal/HOME GOAL" for a
+        goal in a home (`ig2mj.tasks.own_goal`), "FILE.py:NAME" for a task of a file of yours, or the task itself: its
+        class, function or object.
       config: all settings, or a mapping of those that differ from the task's (`default_config`). A name in this place
         is that of the robot: `make("CookingMeat", "fetch", 16, "native", "mitten")` is short for `robot`, `worlds`,
         `engine` and `grasping`.

@@ -6,7 +6,7 @@ that have nothing to do stand still.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -37,10 +37,11 @@ class PhysicsRung:
 
     name = "physics"
 
-    def __init__(self, stage: Stage, seed: int = 0, first: int = 0, query: SceneQuery | None = None):
+    def __init__(self, stage: Stage, seed: int = 0, first: int | Sequence[int] = 0, query: SceneQuery | None = None):
         """
         Args:
-          seed, first: of random streams: a stream belongs to (seed, first + world, number of the step).
+          seed, first: of random streams: a stream belongs to (seed, number, number of the step). The number of a world
+            is first + world, or first[world].
           query: a world of the stage's scene to sample spots in; None: a new one.
 
         Raises:
@@ -54,9 +55,11 @@ class PhysicsRung:
         self.domain = Domain(stage.model, len(body.hands))
         self._planner = MotionPlanner(stage.scene, stage.agent)
         self._query = query
-        self._seed, self._first = seed, first
+        self._seed = seed
         count = stage.num_worlds
+        self._numbers = [first + w for w in range(count)] if isinstance(first, int) else list(first)
         self._running: list[Primitive | None] = [None] * count
+        self._asked: list[Step | None] = [None] * count
         self._programs: list[Program] = [[] for _ in range(count)]
         self._carry = execution.begin(self._programs)
         self._count, self._steps = [0] * count, [0] * count
@@ -71,7 +74,7 @@ class PhysicsRung:
         """A world as primitives see it."""
         if self._query is None:
             self._query = SceneQuery(self.stage.scene)
-        rng = np.random.default_rng([self._seed, self._first + world, self._count[world]])
+        rng = np.random.default_rng([self._seed, self._numbers[world], self._count[world]])
         return PlannedWorld(self.stage, self.body, self.domain, self._planner, self._query, world, rng)
 
     def facts(self, world: int) -> Facts:
@@ -80,6 +83,7 @@ class PhysicsRung:
     def begin(self, world: int, step: Step) -> None:
         self._count[world] += 1
         self._steps[world] = 0
+        self._asked[world] = step
         self._running[world] = primitive(self.world(world), step)
         self._next(world, None)
 
@@ -105,6 +109,17 @@ class PhysicsRung:
         seconds = self._steps[world] * ACTION_PERIOD
         self._ended[world] = Outcome(outcome.reason, outcome.detail, seconds, outcome.attempts)
 
+    def elapsed(self, world: int) -> float:
+        """Simulated seconds of a world's present primitive, or of its last one."""
+        return self._steps[world] * ACTION_PERIOD
+
+    def running(self, world: int) -> Step | None:
+        """What a world's robot carries out; None: nothing."""
+        return self._asked[world] if self._running[world] is not None else None
+
+    def ended(self, world: int) -> str | None:
+        return self.stage.ended(world)
+
     def advance(self) -> dict[int, Outcome]:
         """See `Rung.advance`."""
         while not self._ended and any(r is not None for r in self._running):
@@ -115,7 +130,11 @@ class PhysicsRung:
                 if running is None:
                     continue
                 self._steps[world] += 1
-                if self._steps[world] > MOST_STEPS:
+                over = self.ended(world)
+                if over is not None:
+                    running.close()
+                    self._end(world, Outcome("timeout" if over else "", over))
+                elif self._steps[world] > MOST_STEPS:
                     running.close()
                     self._end(world, Outcome("timeout", f"{MOST_STEPS * ACTION_PERIOD:.0f} s have passed"))
                 elif not self._carry.running[world]:

@@ -20,15 +20,17 @@ from ig2mj.planning.steps import PlanningError
 from ig2mj.predicates.compile import CompiledExpression, compile_expression
 from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.literals import AbilityWarning
+from ig2mj.scene.paths import SHIPPED_HOMES
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.states.model import StateModel
 from ig2mj.tasks.bddl.definitions import activity_names
 from ig2mj.tasks.bddl.goal import conditions
 from ig2mj.tasks.bddl.start import load_bound
-from ig2mj.tasks.bddl.task import PREFIX, activity_pool, bddl_task
+from ig2mj.tasks.bddl.task import PREFIX, BddlTask, activity_pool, bddl_task
+from ig2mj.tasks.own_goal import goal_task, split_goal_name
 from ig2mj.tasks.pools import pool_of
 from ig2mj.tasks.registry import TASKS, load_task
-from ig2mj.tasks.task import Task
+from ig2mj.tasks.task import Task, TaskLike
 from ig2mj.worlds.pool import Pool
 
 
@@ -38,15 +40,29 @@ class Problem:
 
     Attributes:
       name: of the activity, or of the scene. scene: without robots. model: of its states. goal: compiled for the scene.
-      task: of the activity; None: a goal of one's own. objects: that are added to the home (`load_scene`).
+      task: of the activity, or of a goal of one's own. objects: that are added to the home (`load_scene`).
+      instead: a goal in place of the activity's; None: its own.
     """
 
     name: str
     scene: Scene
     model: StateModel
     goal: CompiledExpression
-    task: Any = None
+    task: TaskLike
     objects: tuple[str, ...] = ()
+    instead: str | None = None
+
+    @property
+    def own_goal(self) -> bool:
+        """A home and a goal of one's own: there is one start, that of the scene."""
+        return split_goal_name(self.task.name) is not None
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Names of objects and rooms that its definition names."""
+        goal = [a for atom in self.goal.atoms for a in atom.arguments]
+        own = self.task.binding.objects.values() if isinstance(self.task, BddlTask) else ()
+        return tuple(dict.fromkeys([*goal, *own]))
 
     def pool(self, split: str = "held_out", count: int = 1) -> Pool | None:
         """The activity's first start states, sampled where they are not kept yet; None: the scene's own start.
@@ -54,11 +70,12 @@ class Problem:
         Raises:
           UnknownNameError: no such split. EngineError: none can be sampled.
         """
-        if self.task is None:
+        if self.own_goal:
             return None
-        if isinstance(self.task, Task):
-            return pool_of(self.task, split, count)
-        return activity_pool(self.task, split, count)
+        if isinstance(self.task, BddlTask):
+            return activity_pool(self.task, split, count)
+        assert isinstance(self.task, Task)
+        return pool_of(self.task, split, count)
 
 
 def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) -> Problem:
@@ -81,14 +98,14 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) 
         scene = load_bound(task.binding)
         model = StateModel.of_manifest(scene.tables, scene.manifest)
         compiled = conditions(task.binding).compile_goal(model) if goal is None else _compiled(model, goal)
-        return Problem(short, scene, model, compiled, task, task.binding.additions)
+        return Problem(short, scene, model, compiled, task, task.binding.additions, goal)
     if short in TASKS:
         task = load_task(short)
         if not isinstance(task, Task):
             raise PlanningError(f"{short} has no goal expression to plan for (MotionPlanner.plan_base plans ways)")
         scene = load_scene(task.home, objects=task.objects)
         model = StateModel.of_manifest(scene.tables, scene.manifest)
-        return Problem(short, scene, model, _compiled(model, goal or task.goal), task, task.objects)
+        return Problem(short, scene, model, _compiled(model, goal or task.goal), task, task.objects, goal)
     if goal is None:
         try:
             load_scene(what)
@@ -97,7 +114,8 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) 
         raise PlanningError(f'{what} is a scene: give a goal, such as "(inside apple_0 fridge_0)"')
     scene = load_scene(what, objects=objects)
     model = StateModel.of_manifest(scene.tables, scene.manifest)
-    return Problem(scene.name, scene, model, _compiled(model, goal), objects=tuple(objects))
+    home = scene.name if scene.folder.parent == SHIPPED_HOMES else scene.folder.resolve()
+    return Problem(scene.name, scene, model, _compiled(model, goal), goal_task(home, goal), tuple(objects))
 
 
 def _compiled(model: StateModel, goal: str) -> CompiledExpression:

@@ -36,3 +36,7 @@ class Rung(Protocol):
     def advance(self) -> dict[int, Outcome]:
         """Goes on until the primitive of at least one world has ended; outcomes of the worlds whose primitives have."""
         ...
+
+    def ended(self, world: int) -> str | None:
+        """Why no primitive can begin in a world any more, in words, "" where its goal holds; None: one can."""
+        ...

@@ -73,22 +73,32 @@ class _Episode:
 
 
 def solve(
-    planner: TaskPlanner, rung: Rung, *, seconds: float = math.inf, watch: Watch = unwatched
+    planner: TaskPlanner,
+    rung: Rung,
+    *,
+    seconds: float = math.inf,
+    watch: Watch = unwatched,
+    worlds: Sequence[int] | None = None,
+    ended: Callable[[int, EpisodeResult], None] = lambda world, result: None,
 ) -> list[EpisodeResult]:
     """Solves one episode in each world of a rung.
 
     Args:
-      seconds: wall time after which no further step is begun.
+      seconds: wall time after which no further step is begun. watch: called with each new plan, and at the end.
+      worlds: the first ones of a rung in which there is something to solve; None: all.
+      ended: called with number and result of a world whose episode is over, while others go on.
 
     Raises:
       PlanningError: the goal cannot become true in some world's start.
     """
     end = time.monotonic() + seconds
-    episodes = []
-    for world in range(rung.num_worlds):
+    episodes: list[_Episode] = []
+    for world in range(rung.num_worlds) if worlds is None else worlds:
         episode = _Episode(rung.facts(world).truth(planner.goal.atoms), time.monotonic())
         episodes.append(episode)
         _next(planner, rung, world, episode, end, watch)
+        if episode.result is not None:
+            ended(world, episode.result)
     while any(e.result is None for e in episodes):
         for world, outcome in rung.advance().items():
             episode = episodes[world]
@@ -98,6 +108,8 @@ def solve(
             if not outcome.done and step.serves is not None:
                 episode.failed[step.serves] += 1
             _next(planner, rung, world, episode, end, watch)
+            if episode.result is not None:
+                ended(world, episode.result)
     return [e.result for e in episodes if e.result is not None]
 
 
@@ -119,7 +131,7 @@ def _next(planner: TaskPlanner, rung: Rung, world: int, episode: _Episode, end: 
         episode.plan = plan
         watch(world, plan, episode.records)
         if plan.steps:
-            ended = _limit(episode, end)
+            ended = rung.ended(world) or _limit(episode, end)
             if not ended:
                 rung.begin(world, plan.steps[0])
                 return

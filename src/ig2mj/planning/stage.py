@@ -66,6 +66,10 @@ class Stage(Protocol):
         """An agent step of 1/10 s: the robot's action in its controller's units; other robots stay as they are."""
         ...
 
+    def ended(self, world: int) -> str | None:
+        """Why a world's episode is over, in words, "" for success; None while it goes on."""
+        ...
+
 
 class CoreStage:
     """Worlds of an engine of their own; one robot acts.
@@ -134,3 +138,6 @@ class CoreStage:
         rest = np.zeros((len(action), self._others), np.float32)
         whole = np.concatenate([np.asarray(action, np.float32), rest], axis=1)
         self.batch, _ = self.core.repeat_action_fn(self.batch, whole, self._steps)
+
+    def ended(self, world: int) -> str | None:
+        return None

@@ -74,6 +74,9 @@ class SymbolicRung:
     def begin(self, world: int, step: Step) -> None:
         self._worlds[world].step = step
 
+    def ended(self, world: int) -> str | None:
+        return None
+
     def advance(self) -> dict[int, Outcome]:
         return {w: self._carry_out(w) for w, own in enumerate(self._worlds) if own.step is not None}
 

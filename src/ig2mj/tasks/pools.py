@@ -14,6 +14,7 @@ import json
 import multiprocessing
 import os
 import pathlib
+import re
 import sys
 import threading
 from collections.abc import Callable, Generator, Iterator
@@ -148,11 +149,17 @@ def start_states(task: Task, split: str = "train", scene: Scene | None = None) -
         raise UnknownNameError("split", split, SEEDS)
     own = {} if task.code is None else {**task.code.in_files, "starts": starts_digest(task)}
     return StartStates(
-        f"{task.name}-{split}",
+        f"{_file_name(task.name)}-{split}",
         bare_scene(task) if scene is None else scene,
         lambda digest: [VERSION, digest, *_made_of(task)],
         {"task": task.name, "split": split, "conditions": list(task.start), **own},
     )
+
+
+def _file_name(task: str) -> str:
+    """A task's name as part of a file's; of "goal/HOME GOAL" without the goal, on which no start state depends."""
+    home, _, goal = task.partition(" (")
+    return re.sub(r"[^\w.-]", "_", home)[-60:] if goal else task
 
 
 @entry_point

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -55,12 +56,13 @@ class EpisodeView:
         self,
         state: EnvState,
         qpos: Float[np.ndarray, "nq"] | None = None,
-        camera: int | str | FreeView | None = None,
+        camera: int | str | FreeView | Callable[[mujoco.MjModel, mujoco.MjData], FreeView] | None = None,
     ) -> UInt8[np.ndarray, "Y X 3"]:
         """An image of a state.
 
         Args:
-          qpos: positions in place of those of the state. camera: in place of the one chosen for the episode.
+          qpos: positions in place of those of the state. camera: in place of the one chosen for the episode, or a
+            function that gives it for a model with poses.
 
         Raises:
           MissingDependencyError: nothing can draw here.
@@ -74,6 +76,8 @@ class EpisodeView:
         mujoco.mj_forward(model, drawn)
         if camera is None:
             camera = self._of_episode(model, drawn, state)
+        elif callable(camera):
+            camera = camera(model, drawn)
         states, view = state.batch.world.states, state.batch.world.view
         found = [*marks(self._states, states, view, self._world), *self._goal_marks(state)]
         width, height = self._size

@@ -1,11 +1,10 @@
-"""The table of steps that fills while `ig2mj solve` runs, and the figures at its end."""
+"""What `ig2mj solve` shows: a table of steps that fills while it runs, or lines without a terminal; then figures."""
 
 from __future__ import annotations
 
-import contextlib
-import dataclasses
-import pathlib
-from collections.abc import Callable, Iterator, Sequence
+import sys
+import time
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, Group
@@ -15,104 +14,31 @@ from rich.text import Text
 from ig2mj.cli.common.printing import make_table, stdout_console
 
 if TYPE_CHECKING:
-    from ig2mj.planning.problem import Problem
+    from ig2mj.planning.physics import PhysicsRung
     from ig2mj.planning.solver import EpisodeResult, StepRecord
-    from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
-    from ig2mj.simulation import Simulation
-    from ig2mj.viewer.video import VideoWriter
-    from ig2mj.worlds.pool import Pool
+    from ig2mj.planning.task_planner import TaskPlan
 
 AHEAD = 8
 """Steps of the plan that are shown before they are carried out."""
 
+REFRESH = 0.3
+"""s of wall time between two updates of the table while a step is carried out."""
 
-VIDEO_SIZE, FRAMES_PER_SECOND = (640, 480), 10
-"""Pixels and 1/s of videos: one frame for each agent step."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Options:
-    """How episodes are solved: arguments of `ig2mj solve`."""
-
-    robot: str
-    worlds: int
-    symbolic: bool
-    doors_open: bool
-    seed: int
-    seconds: float
-    record: pathlib.Path | None
-    video: pathlib.Path | None
-
-
-def solved(
-    problem: Problem,
-    planner: TaskPlanner,
-    pool: Pool | None,
-    numbers: Sequence[int],
-    options: Options,
-    table: StepTable,
-) -> Iterator[tuple[int, EpisodeResult]]:
-    """Solves episodes; their numbers and results, each as soon as it is there."""
-    from ig2mj.planning.solver import solve
-    from ig2mj.planning.symbolic import symbolic_episodes
-
-    limits: dict[str, Any] = {"seconds": options.seconds, "watch": table.watch}
-    if options.symbolic:
-        for number, rung in symbolic_episodes(planner.domain, problem.scene, pool, numbers, options.seed):
-            table.begin(number)
-            yield number, solve(planner, rung, **limits)[0]
-        return
-    from ig2mj.simulation.solving import batched_episodes, simulated_episodes
-
-    start = (problem, options.robot, pool, numbers)
-    if options.worlds > 1:
-        for chosen, rung in batched_episodes(*start, options.worlds, options.seed, options.doors_open):
-            table.begin(chosen[0])
-            yield from zip(chosen, solve(planner, rung, **limits), strict=True)
-        return
-    with contextlib.ExitStack() as files:
-        film = recorder = None
-        for number, rung, simulation in simulated_episodes(*start, options.seed, options.doors_open):
-            table.begin(number)
-            if options.record is not None and recorder is None:
-                recorder = files.enter_context(simulation.record(options.record))
-            if options.video is not None and film is None:
-                film = files.enter_context(_film(options.video))
-            if film is not None:
-                rung.watch = _filming(film, simulation)
-            yield number, solve(planner, rung, **limits)[0]
-
-
-def _film(file: pathlib.Path) -> VideoWriter:
-    from ig2mj.viewer.video import VideoWriter
-
-    return VideoWriter(file, *VIDEO_SIZE, FRAMES_PER_SECOND)
-
-
-def _filming(film: VideoWriter, simulation: Simulation) -> Callable[[], None]:
-    """Adds a frame, seen from behind the robot and above."""
-    import numpy as np
-
-    from ig2mj.viewer.offscreen import FreeView
-
-    def add() -> None:
-        agent = simulation.view.agent
-        x, y, z = (float(v) for v in np.asarray(agent.base_pos)[0, 0])
-        camera = FreeView(lookat=(x, y, z), distance=3.0, azimuth=60.0, elevation=-45.0)
-        film.add(simulation.render(camera, width=VIDEO_SIZE[0], height=VIDEO_SIZE[1]))
-
-    return add
+COLUMNS = (">", "primitive", "arguments", "status", ">time", "?>planned in")
 
 
 class StepTable:
-    """Steps of the present episode: those carried out, and the plan's next ones; on stderr, if that is a terminal."""
+    """Steps of episodes: those carried out, and the plan's next ones. On stderr: a table that fills, of the first world
+    that is not done, or without a terminal one line for each step."""
 
-    def __init__(self, title: str, silent: bool = False):
-        """`silent`: shows nothing."""
-        console = Console(stderr=True)
-        self._title, self._on = title, console.is_terminal and not silent
-        self._live = Live(console=console, auto_refresh=False, transient=True) if self._on else None
-        self._heading = ""
+    def __init__(self, title: str):
+        self._console = Console(stderr=True, highlight=False)
+        self._title, self._terminal = title, self._console.is_terminal
+        self._live = Live(console=self._console, auto_refresh=False, transient=True) if self._terminal else None
+        self._numbers: Sequence[int] = (0,)
+        self._plans: dict[int, tuple[TaskPlan, Sequence[StepRecord]]] = {}
+        self._rung: PhysicsRung | None = None
+        self._shown, self._drawn = dict[int, int](), 0.0
 
     def __enter__(self) -> StepTable:
         if self._live is not None:
@@ -123,33 +49,72 @@ class StepTable:
         if self._live is not None:
             self._live.__exit__(*error)
 
-    def begin(self, number: int) -> None:
-        """An episode begins."""
-        self._heading = f"{self._title}: episode {number}"
+    def begin(self, numbers: Sequence[int], rung: PhysicsRung | None = None) -> None:
+        """Episodes begin, one in each world. `rung`: what carries out their steps by actions."""
+        self._numbers, self._rung, self._plans, self._shown = list(numbers), rung, {}, {}
 
     def watch(self, world: int, plan: TaskPlan, records: Sequence[StepRecord]) -> None:
         """As `ig2mj.planning.solver.Watch`."""
-        if self._live is None or world:
+        self._plans[world] = plan, records
+        if self._live is not None:
+            self._draw()
             return
+        for record in records[self._shown.get(world, 0) :]:
+            self._shown[world] = self._shown.get(world, 0) + 1
+            print(f"{self._name(world)}: {self._shown[world]}. {line_of(record)}", file=sys.stderr, flush=True)
+
+    def tick(self) -> None:
+        """An agent step has passed."""
+        if self._live is not None and time.monotonic() > self._drawn + REFRESH:
+            self._draw()
+
+    def _name(self, world: int) -> str:
+        return f"{self._title}, episode {self._numbers[world]}"
+
+    def _draw(self) -> None:
+        assert self._live is not None
+        going = [w for w in sorted(self._plans) if self._plans[w][0].steps] or sorted(self._plans)
+        if not going:
+            return
+        world = going[0]
+        plan, records = self._plans[world]
+        since = f"{self._rung.elapsed(world):.1f} s" if self._rung is not None else ""
         rows = rows_of(records)
         rows += [
-            (len(records) + k + 1, s.primitive, " ".join(s.arguments), "now" if not k else "", "")
+            (len(records) + k + 1, s.primitive, " ".join(s.arguments), *(("now", since) if not k else ("", "")), "")
             for k, s in enumerate(plan.steps[:AHEAD])
         ]
+        room = max(4, self._live.console.height - 5)
+        table = make_table(self._name(world), COLUMNS, rows[-room:], self._live.console.width)
         more = len(plan.steps) - AHEAD
-        table = make_table(self._heading, COLUMNS, rows, self._live.console.width)
-        self._live.update(Group(table, Text(f"and {more} more steps" if more > 0 else "")), refresh=True)
-
-
-COLUMNS = (">", "primitive", "arguments", "status", ">seconds")
+        notes = [f"and {more} more steps"] if more > 0 else []
+        if len(self._numbers) > 1:
+            done = sum(1 for plan, _ in self._plans.values() if not plan.steps)
+            notes.append(f"{len(self._numbers)} episodes side by side, {done} done")
+        self._live.update(Group(table, Text(", ".join(notes))), refresh=True)
+        self._drawn = time.monotonic()
 
 
 def rows_of(records: Sequence[StepRecord]) -> list[tuple]:
     """Rows of `COLUMNS` for steps that were carried out."""
     return [
-        (k + 1, r.step.primitive, " ".join(r.step.arguments), r.outcome.reason or "done", f"{r.seconds:.1f}")
+        (
+            k + 1,
+            r.step.primitive,
+            " ".join(r.step.arguments),
+            r.outcome.reason or "done",
+            f"{r.outcome.time:.1f} s",
+            f"{r.seconds:.1f} s",
+        )
         for k, r in enumerate(records)
     ]
+
+
+def line_of(record: StepRecord) -> str:
+    """A step as text, with the reason of a failure."""
+    outcome = record.outcome
+    how = f"{outcome.reason}: {outcome.detail}" if outcome.reason else "done"
+    return f"{record.step}: {how} ({outcome.time:.1f} s)"
 
 
 def print_result(title: str, result: EpisodeResult) -> None:
@@ -163,11 +128,14 @@ def print_result(title: str, result: EpisodeResult) -> None:
         print(f"ended: {result.ended}")
 
 
-def print_figures(figures: dict[str, Any]) -> None:
+def print_figures(figures: Mapping[str, Any], results: Sequence[EpisodeResult]) -> None:
     """The figures of `ig2mj.planning.solver.summary` in words."""
+    count = figures["episodes"]
+    reach = "episode reaches" if count == 1 else "episodes reach"
     print(
-        f"{figures['success_rate']:.0%} of {figures['episodes']} episodes reach the goal; q {figures['q']:.2f}, "
-        f"{figures['replans']:.1f} new plans an episode, {figures['seconds']:.1f} s"
+        f"{sum(r.success for r in results)} of {count} {reach} the goal; "
+        f"q {figures['q']:.2f}, {figures['replans']:.1f} new plans and "
+        f"{sum(r.time for r in results) / count:.0f} s of simulated time an episode, {figures['seconds']:.1f} s in all"
     )
     rows = [
         (primitive, reason, count)

@@ -1,0 +1,117 @@
+"""`FollowCamera`: a camera that goes along with a robot, from where walls and furniture hide little of what it does."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.scene.geom_groups import VISIBLE_GROUPS
+from ig2mj.scene.tables import SceneTables
+from ig2mj.viewer.offscreen import FreeView
+
+DISTANCES, ELEVATIONS, SIDES = (2.5, 1.8), (-30.0, -48.0, -66.0), 16
+"""m from what is looked at, degrees below the horizon, and number of directions around it that are tried."""
+
+TALL = (0.35, 0.6)
+"""m above the robot's base of the points of its body that should be seen; the second is looked at."""
+
+NEAR = 1.6
+"""m from the robot within which an object is in the image, too."""
+
+SLACK = 0.12
+"""m before a point from which a hit counts as the point itself."""
+
+SHARE = 0.35
+"""Of the way from the robot to the object at which the middle of an image is."""
+
+AGAIN, STAY = 10, 1.0
+"""Images after which another place is looked for, and how much better it must be."""
+
+SMOOTH = 0.2
+"""Share by which the point that is looked at follows in each image."""
+
+PREFERRED = 55.0
+"""Degrees to the side of the robot's back from which a view is best: hands are seen."""
+
+Vector = Float[np.ndarray, "3"]
+
+
+class FollowCamera:
+    """See the module's text. One for each video; it remembers where it is."""
+
+    def __init__(self, tables: SceneTables, agent: int = 0):
+        """`agent`: number of the robot that it goes along with."""
+        self._tables, self._agent = tables, agent
+        self._view: FreeView | None = None
+        self._count, self._focus = 0, -1
+
+    def __call__(self, model: mujoco.MjModel, data: mujoco.MjData, objects: Sequence[int] = ()) -> FreeView:
+        """The camera for the next image.
+
+        Args:
+          data: with poses up to date. objects: numbers of those that matter now, the first most.
+        """
+        tables = self._tables
+        base = data.xpos[tables.agent_body[self._agent]]
+        up = np.array([0.0, 0.0, 1.0])
+        targets = [base + z * up for z in TALL]
+        middle = targets[1]
+        for number in objects:
+            place = data.xipos[tables.object_root[number]]
+            if np.linalg.norm((place - base)[:2]) < NEAR:
+                targets.append(place)
+                middle = (1 - SHARE) * middle + SHARE * place if number == objects[0] else middle
+        targets += [data.xpos[b] for b, a in zip(tables.hand_body, tables.hand_agent, strict=True) if a == self._agent]
+        focus, self._count = (objects[0] if objects else -1), self._count + 1
+        if self._view is None or focus != self._focus or self._count % AGAIN == 0:
+            self._view, self._focus = self._best(model, data, middle, targets, objects), focus
+        before = np.array(self._view.lookat)
+        x, y, z = before + SMOOTH * (middle - before) if np.linalg.norm(before - middle) < 1.0 else middle
+        at = (float(x), float(y), float(z))
+        self._view = FreeView(at, self._view.distance, self._view.azimuth, self._view.elevation)
+        return self._view
+
+    def _best(
+        self, model: mujoco.MjModel, data: mujoco.MjData, middle: Vector, targets: list[Vector], objects: Sequence[int]
+    ) -> FreeView:
+        """The place from which most targets are seen; the present one unless another is clearly better."""
+        tables = self._tables
+        turn = data.xmat[tables.agent_body[self._agent]].reshape(3, 3)
+        yaw = math.degrees(math.atan2(turn[1, 0], turn[0, 0]))
+        own = (tables.body_agent == self._agent) | np.isin(tables.body_object, list(objects))
+        x, y, z = (float(v) for v in middle)
+
+        def value(view: FreeView) -> float:
+            side = abs((view.azimuth - yaw + 180.0) % 360.0 - 180.0)  # 0: behind the robot's back
+            worse = abs(side - PREFERRED) / 90.0 + 0.03 * abs(view.elevation - ELEVATIONS[0])
+            return _seen(model, data, view, targets, own) - worse - (view.distance < DISTANCES[0])
+
+        angles = [360.0 * k / SIDES for k in range(SIDES)]
+        places = [(d, a, e) for d in DISTANCES for e in ELEVATIONS for a in angles]
+        best = max((FreeView((x, y, z), *place) for place in places), key=value)
+        if self._view is None:
+            return best
+        old = FreeView((x, y, z), self._view.distance, self._view.azimuth, self._view.elevation)
+        better = value(best) > value(old) + STAY
+        return dataclasses.replace(best if better else old, lookat=self._view.lookat)
+
+
+def _seen(model: mujoco.MjModel, data: mujoco.MjData, view: FreeView, targets: list[Vector], own: np.ndarray) -> float:
+    """Number of targets that are seen, twice. `own`: bodies that hide nothing."""
+    azimuth, elevation = math.radians(view.azimuth), math.radians(view.elevation)
+    level = math.cos(elevation)
+    ahead = np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
+    eye = np.asarray(view.lookat) - view.distance * ahead
+    group = np.isin(np.arange(mujoco.mjNGROUP), VISIBLE_GROUPS).astype(np.uint8)
+    hit, seen = np.array([-1], np.int32), 0.0
+    for target in targets:
+        way = target - eye
+        length = float(np.linalg.norm(way))
+        distance = mujoco.mj_ray(model, data, eye, way / length, group, 1, -1, hit)
+        seen += 2.0 * (distance < 0 or distance > length - SLACK or bool(own[model.geom_bodyid[hit[0]]]))
+    return seen
