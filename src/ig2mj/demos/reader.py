@@ -151,6 +151,8 @@ class Run:
         column = recording.columns.get(name)
         if column is None:
             raise self.broken(name, "is missing")
+        if name not in recording.arrays:
+            raise self.broken(name, "is missing")
         array, places = recording.arrays[name], index[:, column].astype(np.int64)
         if like is not None and (array.shape[1:] != like.shape or array.dtype != like.dtype):
             raise self.broken(name, f"is {array.dtype}{list(array.shape[1:])}, must be {like.dtype}{list(like.shape)}")
@@ -210,8 +212,9 @@ class Recording:
         self.index = self._array("index", "i", 2)
         if self.index.shape[1] != len(columns):
             raise InputError(self.file, f"must have {len(columns)} columns", element="index", fix=FIX)
-        # A process that was killed at once has written no array yet.
-        there = {name: self._array(name) for name in columns if self.index.shape[0] or self._opened.has(name)}
+        # A process that was killed at once has written no array yet, and runs of one frame have no step.
+        needed = [n for n in columns if self._opened.has(n) or (self.index.shape[0] and not n.startswith("steps/"))]
+        there = {name: self._array(name) for name in needed}
         self.arrays: dict[str, Any] = {name: array for name, array in there.items() if array is not None}
         self.runs: list[Run] = []
         for name in self._opened.names():

@@ -14,6 +14,9 @@ from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.envs.environment import Companions
 from ig2mj.errors import EngineError
+from ig2mj.planning.problem import start_of
+from ig2mj.planning.starts import start_place
+from ig2mj.sampling.query import SceneQuery
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.actions import ActionMap, hand_actions, robot_actions, whole_actions
 from ig2mj.tasks.activity_objective import ActivityObjective
@@ -137,7 +140,7 @@ def setup_activity(
             anywhere = dataclasses.replace(task, robots={name: dataclasses.replace(role, pos=(0.0, 0.0))})
             tried(_placed_activity(anywhere, robot, grasping, lambda: pool_of(task), relaxed_thresholds, control))
         rows = pool if pool is not None else pool_of(task, split, count)
-        x, y, yaw = standing_place(task.home, task.objects, task.objects_of_interest, rows)
+        x, y, yaw = _standing(task, rows)
         task = dataclasses.replace(task, robots={name: dataclasses.replace(role, pos=(x, y), yaw=yaw)})
 
     def starts() -> Pool:
@@ -146,6 +149,17 @@ def setup_activity(
     setup = _placed_activity(task, robot, grasping, starts, relaxed_thresholds, control)
     check_inside(task.name, setup.scene)
     return setup
+
+
+def _standing(task: Task, rows: Pool) -> tuple[float, float, float]:
+    """Where a robot starts: x, y (m) and degrees; in a home without a map of its floor where its geometry has room."""
+    bare = load_scene(task.home, objects=task.objects)
+    if bare.rooms is not None and bare.rooms.traversable is not None:
+        return standing_place(task.home, task.objects, task.objects_of_interest, rows)
+    query = SceneQuery(bare)
+    query.load(start_of(rows, 0)[0])
+    near = [name for name in task.objects_of_interest if name in bare.object_names]
+    return (*start_place(bare, query.view, near), 0.0)
 
 
 def _placed_activity(

@@ -30,7 +30,7 @@ from ig2mj.tasks.bddl.task import PREFIX, BddlTask, activity_pool, bddl_task
 from ig2mj.tasks.own_goal import goal_task, split_goal_name
 from ig2mj.tasks.pools import pool_of
 from ig2mj.tasks.registry import TASKS, load_task
-from ig2mj.tasks.task import Task, TaskLike
+from ig2mj.tasks.task import Task
 from ig2mj.worlds.pool import Pool
 
 
@@ -48,7 +48,7 @@ class Problem:
     scene: Scene
     model: StateModel
     goal: CompiledExpression
-    task: TaskLike
+    task: Task | BddlTask
     objects: tuple[str, ...] = ()
     instead: str | None = None
 
@@ -74,7 +74,6 @@ class Problem:
             return None
         if isinstance(self.task, BddlTask):
             return activity_pool(self.task, split, count)
-        assert isinstance(self.task, Task)
         return pool_of(self.task, split, count)
 
 
