@@ -98,6 +98,10 @@ class PhysicsRung:
         except StopIteration as end:
             self._end(world, end.value)
             return
+        self._follow(world, program)
+
+    def _follow(self, world: int, program: Program) -> None:
+        """A world's program, in place of the present one."""
         self._programs[world] = program
         new: list[list[Phase] | None] = [None] * self.num_worlds
         new[world] = program
@@ -105,7 +109,7 @@ class PhysicsRung:
 
     def _end(self, world: int, outcome: Outcome) -> None:
         self._running[world] = None
-        self._programs[world] = []
+        self._follow(world, [])
         seconds = self._steps[world] * ACTION_PERIOD
         self._ended[world] = Outcome(outcome.reason, outcome.detail, seconds, outcome.attempts)
 
@@ -123,21 +127,39 @@ class PhysicsRung:
     def advance(self) -> dict[int, Outcome]:
         """See `Rung.advance`."""
         while not self._ended and any(r is not None for r in self._running):
-            action, self._carry = execution.advance(self.body, self.stage.agent, self._carry, self.stage.view)
-            self.stage.act(action)
-            self.watch()
-            for world, running in enumerate(self._running):
-                if running is None:
-                    continue
-                self._steps[world] += 1
-                over = self.ended(world)
-                if over is not None:
-                    running.close()
-                    self._end(world, Outcome("timeout" if over else "", over))
-                elif self._steps[world] > MOST_STEPS:
-                    running.close()
-                    self._end(world, Outcome("timeout", f"{MOST_STEPS * ACTION_PERIOD:.0f} s have passed"))
-                elif not self._carry.running[world]:
-                    self._next(world, self._carry.reason(world))
+            self._act()
         ended, self._ended = self._ended, {}
         return ended
+
+    def step(self) -> dict[int, Outcome]:
+        """As `advance`, for one agent step, which passes in any case: worlds without a primitive stand still."""
+        if not self._ended:
+            self._act()
+        ended, self._ended = self._ended, {}
+        return ended
+
+    def stop(self, world: int) -> None:
+        """Ends a world's primitive without an outcome; hands hold what they hold."""
+        running, self._running[world] = self._running[world], None
+        if running is not None:
+            running.close()
+            self._follow(world, [])
+
+    def _act(self) -> None:
+        """An agent step of all worlds."""
+        action, self._carry = execution.advance(self.body, self.stage.agent, self._carry, self.stage.view)
+        self.stage.act(action)
+        self.watch()
+        for world, running in enumerate(self._running):
+            if running is None:
+                continue
+            self._steps[world] += 1
+            over = self.ended(world)
+            if over is not None:
+                running.close()
+                self._end(world, Outcome("timeout" if over else "", over))
+            elif self._steps[world] > MOST_STEPS:
+                running.close()
+                self._end(world, Outcome("timeout", f"{MOST_STEPS * ACTION_PERIOD:.0f} s have passed"))
+            elif not self._carry.running[world]:
+                self._next(world, self._carry.reason(world))

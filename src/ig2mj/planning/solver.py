@@ -6,7 +6,7 @@ import collections
 import dataclasses
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -91,64 +91,92 @@ def solve(
     Raises:
       PlanningError: the goal cannot become true in some world's start.
     """
-    end = time.monotonic() + seconds
-    episodes: list[_Episode] = []
-    for world in range(rung.num_worlds) if worlds is None else worlds:
-        episode = _Episode(rung.facts(world).truth(planner.goal.atoms), time.monotonic())
-        episodes.append(episode)
-        _next(planner, rung, world, episode, end, watch)
-        if episode.result is not None:
-            ended(world, episode.result)
-    while any(e.result is None for e in episodes):
-        for world, outcome in rung.advance().items():
-            episode = episodes[world]
+    solving = Solving(planner, rung, seconds=seconds, watch=watch, worlds=worlds, ended=ended)
+    while not solving.done:
+        solving.take(rung.advance())
+    return solving.results
+
+
+class Solving:
+    """Episodes that are being solved, for those who advance the rung themselves. Arguments and errors as of `solve`."""
+
+    def __init__(
+        self,
+        planner: TaskPlanner,
+        rung: Rung,
+        *,
+        seconds: float = math.inf,
+        watch: Watch = unwatched,
+        worlds: Sequence[int] | None = None,
+        ended: Callable[[int, EpisodeResult], None] = lambda world, result: None,
+    ):
+        self._planner, self._rung, self._watch, self._ended = planner, rung, watch, ended
+        self._end = time.monotonic() + seconds
+        self._episodes: list[_Episode] = []
+        for world in range(rung.num_worlds) if worlds is None else worlds:
+            episode = _Episode(rung.facts(world).truth(planner.goal.atoms), time.monotonic())
+            self._episodes.append(episode)
+            self._next(world, episode)
+
+    @property
+    def done(self) -> bool:
+        """All episodes are over."""
+        return all(e.result is not None for e in self._episodes)
+
+    @property
+    def results(self) -> list[EpisodeResult]:
+        """Of the episodes that are over."""
+        return [e.result for e in self._episodes if e.result is not None]
+
+    def take(self, outcomes: Mapping[int, Outcome]) -> None:
+        """Goes on with the worlds whose primitives have ended."""
+        for world, outcome in outcomes.items():
+            episode = self._episodes[world]
             assert episode.plan is not None
             step = episode.plan.steps[0]
             episode.records.append(StepRecord(step, outcome, time.monotonic() - episode.since))
             if not outcome.done and step.serves is not None:
                 episode.failed[step.serves] += 1
-            _next(planner, rung, world, episode, end, watch)
-            if episode.result is not None:
-                ended(world, episode.result)
-    return [e.result for e in episodes if e.result is not None]
+            self._next(world, episode)
 
-
-def _next(planner: TaskPlanner, rung: Rung, world: int, episode: _Episode, end: float, watch: Watch) -> None:
-    """Plans again, and begins the next step or ends the episode."""
-    episode.since = time.monotonic()
-    facts = rung.facts(world)
-    ended = ""
-    try:
-        plan = planner.plan(facts, episode.failed)
-    except PlanningError as e:
-        if episode.plan is None:
-            raise
-        plan, ended = episode.plan, str(e)
-    else:
-        before = None if episode.plan is None else episode.plan.steps[1:]
-        episode.replans += before is not None and [*map(str, plan.steps)] != [*map(str, before)]
-        episode.planned = episode.planned or len(plan.steps)
-        episode.plan = plan
-        watch(world, plan, episode.records)
-        if plan.steps:
-            ended = rung.ended(world) or _limit(episode, end)
-            if not ended:
-                rung.begin(world, plan.steps[0])
-                return
-        elif not plan.done:
-            ended = f"{plan.missing[0]} failed {episode.failed[plan.missing[0]]} times"
-    truth = facts.truth(planner.goal.atoms)
-    success = value_of(planner.goal.ground, truth)
-    episode.result = EpisodeResult(
-        success=success,
-        q=1.0 if success else quality(planner.goal.ground, episode.start, truth),
-        steps=tuple(episode.records),
-        replans=episode.replans,
-        planned=episode.planned,
-        seconds=time.monotonic() - episode.began,
-        time=float(sum(r.outcome.time for r in episode.records)),
-        ended="" if success else ended,
-    )
+    def _next(self, world: int, episode: _Episode) -> None:
+        """Plans again, and begins the next step or ends the episode."""
+        planner, rung = self._planner, self._rung
+        episode.since = time.monotonic()
+        facts = rung.facts(world)
+        ended = ""
+        try:
+            plan = planner.plan(facts, episode.failed)
+        except PlanningError as e:
+            if episode.plan is None:
+                raise
+            plan, ended = episode.plan, str(e)
+        else:
+            before = None if episode.plan is None else episode.plan.steps[1:]
+            episode.replans += before is not None and [*map(str, plan.steps)] != [*map(str, before)]
+            episode.planned = episode.planned or len(plan.steps)
+            episode.plan = plan
+            self._watch(world, plan, episode.records)
+            if plan.steps:
+                ended = rung.ended(world) or _limit(episode, self._end)
+                if not ended:
+                    rung.begin(world, plan.steps[0])
+                    return
+            elif not plan.done:
+                ended = f"{plan.missing[0]} failed {episode.failed[plan.missing[0]]} times"
+        truth = facts.truth(planner.goal.atoms)
+        success = value_of(planner.goal.ground, truth)
+        episode.result = EpisodeResult(
+            success=success,
+            q=1.0 if success else quality(planner.goal.ground, episode.start, truth),
+            steps=tuple(episode.records),
+            replans=episode.replans,
+            planned=episode.planned,
+            seconds=time.monotonic() - episode.began,
+            time=float(sum(r.outcome.time for r in episode.records)),
+            ended="" if success else ended,
+        )
+        self._ended(world, episode.result)
 
 
 def _limit(episode: _Episode, end: float) -> str:

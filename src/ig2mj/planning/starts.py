@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 
+from ig2mj.agents.registry import find_robot
+from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.engine.base import Write
 from ig2mj.engine.view import PhysicsView
 from ig2mj.engine.writes import joints
 from ig2mj.errors import EngineError
 from ig2mj.planning.footprint import LOWEST, BaseFootprint, Disc
 from ig2mj.planning.occupancy import Occupancy, door_objects
-from ig2mj.scene.scene import Scene
+from ig2mj.planning.problem import Problem, start_of
+from ig2mj.sampling.query import SceneQuery
+from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.worlds.pool import Pool
 
 ROOM, TALL = 0.34, 1.3
 """m: radius of the free floor on which a robot starts, and height up to which it is free."""
@@ -44,6 +50,25 @@ def start_place(scene: Scene, view: PhysicsView, near: Sequence[str]) -> tuple[f
         best = int(np.argmax(spare[tuple(cells.T)]))
     x, y = occupancy.middles(cells[best])
     return float(x), float(y)
+
+
+def scene_with_robot(problem: Problem, robot: str | TaskRobot, pool: Pool | None = None) -> Scene:
+    """A problem's scene with a robot on free floor near what the goal is about.
+
+    Args:
+      pool: start states, the first of which counts; None: the scene's own start.
+
+    Raises:
+      UnknownNameError: no such robot. EngineError: no floor is free.
+    """
+    query = SceneQuery(problem.scene)
+    if pool is not None:
+        query.load(start_of(pool, 0)[0])
+    tables, names = problem.scene.tables, problem.scene.object_names
+    near = [n for n in problem.named if n in names and not tables.object_is_floor[names.index(n)]]
+    x, y = start_place(problem.scene, query.view, near)
+    body: Any = find_robot(robot)[1]
+    return load_scene(problem.scene.folder, agents=[body.at(x, y, 0.0)], objects=problem.objects)
 
 
 def open_doors(scene: Scene, without: Collection[str] = ()) -> Write | None:
