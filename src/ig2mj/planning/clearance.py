@@ -139,6 +139,21 @@ class Obstacles:
         away = np.einsum("pni,pi->pn", self._normal[piece], centre[sphere]) - self._offset[piece]
         return bool((away.max(-1, initial=-1.0) >= radius[sphere, 0]).all())
 
+    def entries(
+        self, origins: Float[np.ndarray, "R 3"], directions: Float[np.ndarray, "R 3"], of: int
+    ) -> Float[np.ndarray, "R"]:
+        """m along rays (unit vectors) to where each enters the first piece of an object; infinite: it meets none."""
+        mine = np.flatnonzero(self.objects == of)
+        slope = np.einsum("kni,ri->rkn", self._normal[mine], directions)
+        left = self._offset[mine] - np.einsum("kni,ri->rkn", self._normal[mine], origins)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at = left / slope
+        first = np.where(slope < -1e-9, at, -np.inf).max(-1, initial=-np.inf)
+        last = np.where(slope > 1e-9, at, np.inf).min(-1, initial=np.inf)
+        outside = ((np.abs(slope) <= 1e-9) & (left < 0)).any(-1)
+        meets = (first <= last) & (last >= 0) & ~outside
+        return np.where(meets, np.maximum(first, 0.0), np.inf).min(-1, initial=np.inf)
+
     def below(self, xy: Float[np.ndarray, "2"], height: float, of: Collection[int]) -> float:
         """World z of the highest point below a height, over x and y, of some objects; -inf: there is none."""
         mine = np.flatnonzero(self._keep & np.isin(self.objects, list(of)) & (self._low[:, 2] < height))

@@ -21,6 +21,9 @@ FAR_OUT, HEIGHTS = 0.85, (0.35, 1.35)
 
 Vector = Float[np.ndarray, "3"]
 
+FaceGrip = tuple[Vector, Vector]
+"""A point of a face where a hand is, and the face's normal."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class OpenableJoint:
@@ -29,7 +32,8 @@ class OpenableJoint:
     Attributes:
       name: of the joint. object, object_index: whose it is. hinge: it turns; else it slides.
       anchor, axis: of the hinge; the slide's axis. now, closed, open: positions. vertices: corners of the link.
-      grips: points of the face that moves ahead when it opens, with its normal, the best first.
+      grips: points of the face that moves ahead when it opens, with its normal, the best first. edges: of the side of
+        a door that is farthest from its hinge.
     """
 
     name: str
@@ -42,7 +46,8 @@ class OpenableJoint:
     closed: float
     open: float
     vertices: Float[np.ndarray, "V 3"]
-    grips: tuple[tuple[Vector, Vector], ...]
+    grips: tuple[FaceGrip, ...]
+    edges: tuple[FaceGrip, ...] = ()
 
     @property
     def fraction(self) -> float:
@@ -55,7 +60,7 @@ class OpenableJoint:
             return points + by * self.axis
         return (points - self.anchor) @ _about(self.axis, by).T + self.anchor
 
-    def path(self, grip: tuple[Vector, Vector], fraction: float) -> list[tuple[Vector, Vector]]:
+    def path(self, grip: FaceGrip, fraction: float) -> list[FaceGrip]:
         """Points and normals of the face where a hand is, from where the link is now to a share of its range."""
         by = self.closed + fraction * (self.open - self.closed) - self.now
         point, normal = grip
@@ -73,7 +78,7 @@ class OpenableJoint:
         return np.concatenate([self.moved(corners, share * by) for share in np.linspace(0, 1, STEPS)])
 
     @property
-    def inner_grips(self) -> tuple[tuple[Vector, Vector], ...]:
+    def inner_grips(self) -> tuple[FaceGrip, ...]:
         """Points of the other face, with its normal."""
         found = []
         for point, normal in self.grips:
@@ -114,12 +119,14 @@ def openable_joints(scene: Scene, view: PhysicsView, index: int, world: int = 0)
             vertices,
             (),
         )
-        found.append(dataclasses.replace(joint, grips=_grips(joint)))
+        grips, edges = _grips(joint)
+        found.append(dataclasses.replace(joint, grips=grips, edges=edges))
     return sorted(found, key=lambda joint: -float(np.ptp(joint.vertices, axis=0).prod()))
 
 
-def _grips(joint: OpenableJoint) -> tuple[tuple[Vector, Vector], ...]:
-    """Points on the face that is ahead when the joint opens, far from a hinge, at heights that hands like."""
+def _grips(joint: OpenableJoint) -> tuple[tuple[FaceGrip, ...], tuple[FaceGrip, ...]]:
+    """Points on the face that is ahead when the joint opens, far from a hinge, at heights that hands like; and on the
+    side that is farthest from a hinge."""
     sign = np.sign(joint.open - joint.closed)
     vertices = joint.vertices
     middle = vertices.mean(0)
@@ -127,7 +134,7 @@ def _grips(joint: OpenableJoint) -> tuple[tuple[Vector, Vector], ...]:
         normal = sign * joint.axis
         across = [v for v in np.eye(3) if abs(v @ normal) < 0.7]
         face = middle + (((vertices - middle) @ normal).max()) * normal
-        return tuple((face + s * a * 0.25 * np.ptp(vertices @ a), normal) for a in across for s in (0, 1, -1))
+        return tuple((face + s * a * 0.25 * np.ptp(vertices @ a), normal) for a in across for s in (0, 1, -1)), ()
     radial = vertices - joint.anchor
     radial -= np.outer(radial @ joint.axis, joint.axis)
     farthest = radial[np.argmax(np.linalg.norm(radial, axis=1))]
@@ -136,19 +143,21 @@ def _grips(joint: OpenableJoint) -> tuple[tuple[Vector, Vector], ...]:
     out /= max(float(np.linalg.norm(out)), 1e-9)
     reach = float((radial @ out).max()) if len(radial) else float(np.linalg.norm(farthest))
     normal = sign * np.cross(joint.axis, out)
-    depth = float(((vertices - joint.anchor) @ normal).max())
+    depth = (vertices - joint.anchor) @ normal
     along = (vertices - joint.anchor) @ joint.axis
-    found = []
+    grips, edges = [], []
     for share in (0.5, 0.35, 0.65, 0.2, 0.8):
-        height = along.min() + share * np.ptp(along)
+        height = (along.min() + share * np.ptp(along)) * joint.axis
         for part in (FAR_OUT, 0.65):
-            found.append((joint.anchor + part * reach * out + height * joint.axis + depth * normal, normal))
+            grips.append((joint.anchor + part * reach * out + height + float(depth.max()) * normal, normal))
+        tip = depth[radial @ out > 0.95 * reach]
+        edges.append((joint.anchor + reach * out + height + float(tip.max() + tip.min()) / 2 * normal, out))
 
-    def comfort(grip: tuple[Vector, Vector]) -> float:
+    def discomfort(grip: FaceGrip) -> float:
         z = float(grip[0][2])
         return max(HEIGHTS[0] - z, 0.0) + max(z - HEIGHTS[1], 0.0)
 
-    return tuple(sorted(found, key=comfort))
+    return tuple(sorted(grips, key=discomfort)), tuple(sorted(edges, key=discomfort))
 
 
 def _about(axis: Vector, angle: float) -> Float[np.ndarray, "3 3"]:

@@ -11,6 +11,7 @@ from collections.abc import Generator, Sequence
 
 import numpy as np
 
+from ig2mj.planning.clearance import Obstacles, hand_way, straight
 from ig2mj.planning.phases import Base, Phase, Until
 from ig2mj.planning.steps import Outcome
 from ig2mj.planning.world import PlannedWorld, Stance, Vector
@@ -33,7 +34,7 @@ AWAY = 0.55
 RETREAT = 0.12
 """m that a hand goes back after it has let go."""
 
-DOWN = np.array([0.0, 0.0, -1.0])
+UP, DOWN = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,13 +74,43 @@ def drive(points: np.ndarray, yaw: float | None) -> Program:
 # Hands.
 
 
-def directions(stance: Stance, kind: str) -> tuple[Vector, Vector]:
-    """Where fingers point and the palm faces, world frame: "down": onto something, "front": against a face."""
-    ahead = np.array([np.cos(stance.yaw), np.sin(stance.yaw), 0.0])
-    return (ahead, DOWN) if kind == "down" else (-DOWN, ahead)
+ENTRIES = (0.2, 0.35, 0.5)
+"""m before a goal to which a hand goes first where it finds no way to the goal itself."""
 
 
-def travel(world: PlannedWorld, hand: int, points: Sequence[Vector], quat, keeps: int = -1) -> Program:
+def hand_path(
+    obstacles: Obstacles,
+    spheres: np.ndarray,
+    start: Vector,
+    goal: Vector,
+    entries: Sequence[Vector] = (),
+    spare: float = 0.0,
+) -> list[Vector] | None:
+    """Points of a hand's way, without the first; None: no way was found. See `ig2mj.planning.clearance.hand_way`.
+
+    Args:
+      entries: unit vectors from the goal, along which a hand comes straight to it where nothing else is free.
+    """
+    way = hand_way(obstacles, spheres, start, goal, spare)
+    if way is not None:
+        return way
+    for apart in ENTRIES:
+        for entry in entries:
+            before = goal + apart * entry
+            if not straight(obstacles, spheres, before, goal, spare):
+                continue
+            way = hand_way(obstacles, spheres, start, before)
+            if way is not None:
+                return [*way, goal]
+    return None
+
+
+def ahead(yaw: float) -> Vector:
+    """The horizontal direction of an angle, rad."""
+    return np.array([np.cos(yaw), np.sin(yaw), 0.0])
+
+
+def travel(hand: int, points: Sequence[Vector], quat, keeps: int = -1) -> Program:
     """Phases of a hand along points of a way."""
     last = len(points) - 1
     return [

@@ -15,10 +15,10 @@ from ig2mj.planning import execution
 from ig2mj.planning.bodies import HoveringBody, body_of
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
-from ig2mj.planning.manipulation import primitive
 from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.moves import Primitive, Program
 from ig2mj.planning.phases import Phase
+from ig2mj.planning.primitives import primitive
 from ig2mj.planning.stage import Stage
 from ig2mj.planning.steps import Outcome, PlanningError, Step
 from ig2mj.planning.world import PlannedWorld

@@ -8,23 +8,24 @@ from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
-from ig2mj.planning.clearance import hand_way
 from ig2mj.planning.moves import (
     ATTEMPTS,
     AWAY,
     DOWN,
+    UP,
     Primitive,
     Program,
+    ahead,
     carry,
-    directions,
     go,
+    hand_path,
     hand_with,
     travel,
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import DirtSpot, PlannedWorld, Stance, Vector
+from ig2mj.planning.world import DirtSpot, PlannedWorld, Stance, Vector, about_vertical
 from ig2mj.scene.tables import LinkKind
 
 # Water, dirt, heat and cold.
@@ -111,16 +112,15 @@ def _at_spot(spot: DirtSpot, offset: Vector, half: Vector) -> Vector:
 def _wipe_program(world: PlannedWorld, spots: Sequence[DirtSpot], tool: str, hand: int) -> Program:
     offset, half = _tool_box(world, tool, hand)
     _, yaw = world.base
-    fingers = np.array([np.cos(yaw), np.sin(yaw), 0.0])
-    obstacles, spheres = world.obstacles([tool]), world.spheres(fingers)
+    obstacles, spheres = world.obstacles([tool]), world.spheres(*world.hand_axes(hand))
     keeps, at, program = world.index(tool), world.grip(hand), Program()
     for spot in spots:
         target = _at_spot(spot, offset, half)
         before = target + LIFTED * spot.normal
-        way = hand_way(obstacles, spheres, at, before)
+        way = hand_path(obstacles, spheres, at, before, [UP, -ahead(yaw)])
         if way is None:
             continue
-        program += travel(world, hand, way, None, keeps=keeps)
+        program += travel(hand, way, None, keeps=keeps)
         program += [
             Phase(hand=hand, pos=vector3(target), keeps=keeps, tolerance=0.004, limit=6, after="", speed=0.04),
             Phase(hand=hand, pos=vector3(before), keeps=keeps, tolerance=0.03, limit=12, after=""),
@@ -156,25 +156,24 @@ def _hold_at(
 
     for point in points:
         obstacles, floor = world.obstacles([name]), world.floor()
-        for stance in world.stances(hand, point - part() + world.grip(hand), floor, AWAY):
-            ahead, _ = directions(stance, "down")
-            _, now = world.base
-            c, s = np.cos(stance.yaw - now), np.sin(stance.yaw - now)
-            target = point + np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (world.grip(hand) - part())
-            if not world.reaches(hand, stance, target):
-                continue
-            spheres = world.spheres(ahead, holding=name, hand=hand, turn=stance.yaw - now)
-            if hand_way(obstacles, spheres, world.carried(hand, stance), target) is None:
+        _, now = world.base
+        held = about_vertical(-now) @ (world.grip(hand) - part())
+        for stance in world.stances(hand, point, floor, AWAY, held=held):
+            rotation = about_vertical(stance.yaw - now)
+            target = point + rotation @ (world.grip(hand) - part())
+            spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+            if hand_path(obstacles, spheres, world.carried(hand, stance), target, [UP, -ahead(stance.yaw)]) is None:
                 continue
             if reason := (yield from go(world, stance)):
+                _, now = world.base
                 continue
             target = point - part() + world.grip(hand)
-            ahead, _ = directions(Stance(stance.xy, world.base[1]), "down")
-            spheres = world.spheres(ahead, holding=name, hand=hand)
-            way = hand_way(world.obstacles([name]), spheres, world.grip(hand), target)
+            spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
+            entries = [UP, -ahead(world.base[1])]
+            way = hand_path(world.obstacles([name]), spheres, world.grip(hand), target, entries)
             if way is None:
                 continue
-            reason = yield travel(world, hand, way, None, keeps=world.index(name))
+            reason = yield travel(hand, way, None, keeps=world.index(name))
             return reason, way
     return "no_path", []
 
@@ -195,7 +194,7 @@ def soak(world: PlannedWorld, step: Step) -> Primitive:
     if reason:
         return Outcome(reason, f"the hand has no way with {name} below {tap}")
     reason = yield from _wait(world, "soaked", name, SOAKING, world.index(name))
-    yield [*travel(world, hand, way[-2::-1], None), carry(world, hand)]
+    yield [*travel(hand, way[-2::-1], None), carry(world, hand)]
     return Outcome(reason, f"{name} did not take enough water" if reason else "")
 
 
@@ -224,7 +223,7 @@ def cook(world: PlannedWorld, step: Step) -> Primitive:
     keeps = world.index(name) if hand >= 0 else -1
     reason = yield from _wait(world, "cooked", name, COOKING, keeps)
     if hand >= 0:
-        yield [*travel(world, hand, way[-2::-1], None), carry(world, hand)]
+        yield [*travel(hand, way[-2::-1], None), carry(world, hand)]
     return Outcome(reason, f"{name} did not get hot enough" if reason else "")
 
 
@@ -258,7 +257,7 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
         keeps = world.index(knife)
         reason = yield [
             Phase(hand=hand, pos=pressed, keeps=keeps, tolerance=0.01, limit=25, after="", speed=0.04),
-            *travel(world, hand, way[::-1], None),
+            *travel(hand, way[::-1], None),
         ]
         detail = f"the blade did not press hard enough on {name}"
     yield [carry(world, hand)]

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import PhysicsView
-from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_rotate
+from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.bodies import HoveringBody, Senses, grip_of, sense
 from ig2mj.planning.clearance import Obstacles
@@ -42,7 +42,16 @@ APART = 0.12
 EACH = 3
 """Spots of a placement in each area of its rule."""
 
+TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
+"""rad about the vertical that an object may be turned by, from how it is held in front of the robot."""
+
+ORIENTATIONS, ORIENTATION_SPREAD = 2, 1.7
+"""Orientations at rest that are tried, and rad by which they may be farther from the present one than the nearest."""
+
+UP = np.array([0.0, 0.0, 1.0])
+
 Vector = Float[np.ndarray, "3"]
+Rotation = Float[np.ndarray, "3 3"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,6 +60,14 @@ class Stance:
 
     xy: tuple[float, float]
     yaw: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Spot:
+    """Where an object is to be: position (m) and orientation (w-x-y-z) of its main body, world frame."""
+
+    pos: Vector
+    quat: Float[np.ndarray, "4"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -159,26 +176,28 @@ class PlannedWorld:
         palm: Sequence[float] | np.ndarray = (0.0, 0.0, -1.0),
         holding: str = "",
         hand: int = 0,
-        turn: float = 0.0,
+        rotation: Rotation | None = None,
     ) -> np.ndarray:
-        """What keeps clear about a hand's grasp point: x, y, z (world axes) and radius of each; five of the palm first.
+        """What keeps clear about a hand's grasp point: `hand_spheres`, and corners of what it holds.
 
         Args:
           fingers, palm: where they point, and it faces. holding: what it holds, whose corners keep clear, too.
-          turn: rad about the vertical by which that is turned.
+          rotation: by which that is turned, world frame.
         """
-        ahead, back = np.asarray(fingers, float), -BEHIND * np.asarray(palm, float)
-        side = np.cross(ahead, np.asarray(palm, float))
-        corners = [(0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
-        centres = [back + CORNER * (a * ahead + b * side) for a, b in corners] + [back + a * ahead for a in ALONG]
-        found = [np.array([*c, RADIUS]) for c in centres]
+        found = hand_spheres(fingers, palm)
         if holding:
             points = self.vertices(holding) - self.grip(hand)
-            c, s = np.cos(turn), np.sin(turn)
-            points = points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+            points = points if rotation is None else points @ rotation.T
             step = max(1, len(points) // HELD_POINTS)
-            found += [np.array([*p, HELD_MARGIN]) for p in points[::step]]
-        return np.array(found)
+            margin = np.full((len(points[::step]), 1), HELD_MARGIN)
+            found = np.concatenate([found, np.concatenate([points[::step], margin], axis=1)])
+        return found
+
+    def hand_axes(self, hand: int, rotation: Rotation | None = None) -> tuple[Vector, Vector]:
+        """Where a hand's fingers point, and its palm faces, if it were turned, world frame."""
+        frame = matrices_on_host(self.hand_quat(hand)[None])[0]
+        frame = frame if rotation is None else rotation @ frame
+        return frame[:, 1] * (1.0 if hand == 0 else -1.0), frame[:, 2]
 
     def floor(self) -> FreeFloor:
         """Where the robot can stand with what it holds."""
@@ -218,11 +237,21 @@ class PlannedWorld:
         """Whether a hand reaches a point from a stance."""
         return bool(self._reach_from(hand, np.array([stance.xy]), np.array([stance.yaw]), point)[0])
 
-    def stances(self, hand: int, point: Vector, floor: FreeFloor, away: float, most: int = 10) -> Iterator[Stance]:
+    def stances(
+        self,
+        hand: int,
+        point: Vector,
+        floor: FreeFloor,
+        away: float,
+        most: int = 10,
+        held: Vector | None = None,
+    ) -> Iterator[Stance]:
         """Where the robot can stand so that a hand reaches a point, the nearest and most comfortable first.
 
         Args:
           away: m, horizontal, that the base would like to be from the point.
+          held: what is brought to the point is a part of what the hand holds, and this leads from it to the hand's
+            grasp point, m, in the body's frame.
         """
         here, _ = self.base
         cells = floor.within(point[:2], self.body.reach)
@@ -233,7 +262,8 @@ class PlannedWorld:
         yaw = np.arctan2(offset[:, 1], offset[:, 0]) - np.arctan2(side, np.maximum(apart, 0.3))
         way = floor.distances(here, NEAR_START)[tuple(cells.T)]
         cost = 0.6 * way + 2.0 * np.abs(apart - away) - 0.5 * np.minimum(floor.spare[tuple(cells.T)], 0.2)
-        cost[~self._reach_from(hand, middles, yaw, point)] = np.inf
+        target = point if held is None else point + _turned_vectors(yaw, held)
+        cost[~self._reach_from(hand, middles, yaw, target)] = np.inf
         for _ in range(most):
             if not len(cost) or not np.isfinite(cost[best := int(np.argmin(cost))]):
                 return
@@ -241,7 +271,7 @@ class PlannedWorld:
             yield Stance((float(middles[best][0]), float(middles[best][1])), float(yaw[best]))
 
     def _reach_from(
-        self, hand: int, xy: Float[np.ndarray, "n 2"], yaw: Float[np.ndarray, "n"], point: Vector
+        self, hand: int, xy: Float[np.ndarray, "n 2"], yaw: Float[np.ndarray, "n"], point: Float[np.ndarray, "*n 3"]
     ) -> Bool[np.ndarray, "n"]:
         """Whether a hand reaches a point from each of some stances."""
         x, y, z = self.body.shoulders[hand]
@@ -264,24 +294,40 @@ class PlannedWorld:
         order = sorted(alive.tolist(), key=lambda n: float(np.linalg.norm(pos[n, :2] - here)))
         return [DirtSpot(n, pos[n], normal[n]) for n in order]
 
-    def spots(self, predicate: str, name: str, where: str, turns: Sequence[float]) -> Iterator[tuple[Vector, float]]:
-        """Positions of an object's main body that make a placement true, for turns (rad) of it about the vertical."""
+    def spots(self, predicate: str, name: str, where: str) -> Iterator[Spot]:
+        """Poses of an object's main body that make a placement true. Orientations in which it rests come first, those
+        nearest to how it is held before others, each turned about the vertical."""
         self.query.load(self.stage.snapshot(self.world))
         index = self.index(name)
         second = room_index(self.domain.model, where) if predicate == "on_floor" else self.index(where)
         areas = PLACEMENTS[predicate](self.query, index, second)
         placer = Placer(self.query)
-        _, quat = self.pose(name)
-        for turn in turns:
-            new = _yawed(quat, turn)
-            for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
-                found = 0
-                for pos in placer.spots(index, areas, new, self.rng, support, each=EACH):
-                    if predicate in ("on_top", "on_floor") or self._would_hold(predicate, name, where, pos, new):
-                        found += 1
-                        yield pos, turn
-                if found:
-                    break
+        for quat in self._upright(name):
+            for angle in TURNS:
+                new = _yawed(quat, angle)
+                for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
+                    found = 0
+                    for pos in placer.spots(index, areas, new, self.rng, support, each=EACH):
+                        if predicate in ("on_top", "on_floor") or self._would_hold(predicate, name, where, pos, new):
+                            found += 1
+                            yield Spot(pos, new)
+                    if found:
+                        break
+
+    def _upright(self, name: str) -> list[Float[np.ndarray, "4"]]:
+        """Orientations in which an object rests, each the nearest to its present one; that, where none is known."""
+        _, now = self.pose(name)
+        frame = matrices_on_host(now[None])[0]
+        found = []
+        for entry in self.stage.scene.manifest.objects[self.index(name)].orientations:
+            up = frame @ matrices_on_host(np.array([entry.quat], float))[0][2]  # the vertical of that orientation, now
+            axis, angle = np.cross(up, UP), float(np.arccos(np.clip(up[2], -1.0, 1.0)))
+            axis = axis / np.linalg.norm(axis) if np.linalg.norm(axis) > 1e-6 else np.array([1.0, 0.0, 0.0])
+            tilt = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])
+            found.append((angle, np.asarray(quat_multiply(tilt, now), float)))
+        found.sort(key=lambda pair: pair[0])
+        kept = [quat for angle, quat in found if angle < found[0][0] + ORIENTATION_SPREAD][:ORIENTATIONS]
+        return kept or [now]
 
     def _would_hold(self, predicate: str, name: str, where: str, pos: Vector, quat: np.ndarray) -> bool:
         """Whether a placement that does not depend on contact would be true."""
@@ -292,11 +338,37 @@ class PlannedWorld:
         self.query.load(before)
         return holds
 
-    def grip_for(self, hand: int, name: str, pos: Vector, turn: float) -> tuple[Vector, Float[np.ndarray, "4"]]:
-        """Grasp point and orientation of a hand that holds an object, if the object were at `pos`, turned by `turn`."""
-        own_pos, _ = self.pose(name)
-        offset = np.asarray(quat_rotate(_turn(turn), (self.grip(hand) - own_pos)), float)
-        return pos + offset, np.asarray(quat_multiply(_turn(turn), self.hand_quat(hand)), float)
+    def grip_for(self, hand: int, name: str, spot: Spot) -> tuple[Vector, Float[np.ndarray, "4"], Rotation]:
+        """Grasp point and orientation of a hand that holds an object, if the object were at a spot, and the rotation
+        that brings both there."""
+        own_pos, own_quat = self.pose(name)
+        turn = np.asarray(quat_multiply(spot.quat, quat_conjugate(own_quat)), float)
+        rotation = matrices_on_host(turn[None])[0]
+        target = spot.pos + rotation @ (self.grip(hand) - own_pos)
+        return target, np.asarray(quat_multiply(turn, self.hand_quat(hand)), float), rotation
+
+
+def hand_spheres(fingers: Sequence[float] | np.ndarray, palm: Sequence[float] | np.ndarray) -> Float[np.ndarray, "S 4"]:
+    """x, y, z from a hand's grasp point (world axes) and radius of spheres that hold an open hand, m; five of the palm
+    first."""
+    ahead, back = np.asarray(fingers, float), -BEHIND * np.asarray(palm, float)
+    side = np.cross(ahead, np.asarray(palm, float))
+    corners = [(0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
+    centres = [back + CORNER * (a * ahead + b * side) for a, b in corners] + [back + a * ahead for a in ALONG]
+    return np.array([[*c, RADIUS] for c in centres])
+
+
+def _turned_vectors(yaw: Float[np.ndarray, "n"], vector: Vector) -> Float[np.ndarray, "n 3"]:
+    """A vector turned about the vertical by each of some angles, rad."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    x, y, z = vector
+    return np.stack([c * x - s * y, s * x + c * y, np.full(len(yaw), z)], axis=1)
+
+
+def about_vertical(angle: float) -> Rotation:
+    """Rotation matrix."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _turn(angle: float) -> Float[np.ndarray, "4"]:
@@ -306,8 +378,3 @@ def _turn(angle: float) -> Float[np.ndarray, "4"]:
 def _yawed(quat: Float[np.ndarray, "4"], angle: float) -> Float[np.ndarray, "4"]:
     turned = np.asarray(quat_multiply(_turn(angle), quat), float)
     return turned / np.linalg.norm(turned)
-
-
-def relative(quat: Float[np.ndarray, "4"], to: Float[np.ndarray, "4"]) -> Float[np.ndarray, "4"]:
-    """The turn from one orientation to another, world frame."""
-    return np.asarray(quat_multiply(to, quat_conjugate(quat)), float)

@@ -1,0 +1,148 @@
+"""Taking hold of objects, and letting them go."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+
+import numpy as np
+
+from ig2mj.planning.grasps import GraspPose, grasp_poses, ordered
+from ig2mj.planning.moves import (
+    ATTEMPTS,
+    AWAY,
+    BELOW,
+    UP,
+    Primitive,
+    Program,
+    ahead,
+    carry,
+    free_hand,
+    go,
+    hand_path,
+    hand_with,
+    rest,
+    travel,
+    vector3,
+)
+from ig2mj.planning.opening import open_around
+from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.steps import Outcome, Step
+from ig2mj.planning.world import PlannedWorld, Stance, Vector
+
+LIFT = 0.03
+"""m that an object is lifted before it is drawn sideways."""
+
+POSES, WAYS = 6, 40
+"""Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
+
+
+def grasp(world: PlannedWorld, step: Step) -> Primitive:
+    """The hand goes onto a side of the object that has room for it, until it holds it."""
+    name = step.object
+    if name in world.held:
+        return Outcome()
+    tables, index = world.domain.model.tables, world.index(name)
+    if not ((tables.graspable_object == index) & (tables.graspable_joint < 0)).any():
+        return Outcome("no_grasp", f"{name} is fixed, or its category allows no assisted grasp")
+    reason, detail, tried = "no_grasp", "", list[GraspPose]()
+    for attempt in range(ATTEMPTS):
+        hand = free_hand(world, attempt)
+        found = _plan(world, name, hand, tried)
+        if found is None:
+            reason, detail = "no_base", f"no free floor from which a hand has a way to {name}"
+            yield from open_around(world, name, attempt)
+            continue
+        stance, pose = found
+        if reason := (yield from go(world, stance)):
+            detail = f"no way leads to where a hand reaches {name}"
+            continue
+        tried.append(pose)
+        reason, detail = yield from _take(world, name, hand, pose)
+        if name in world.held:
+            return Outcome(attempts=attempt + 1)
+    return Outcome(reason or "no_grasp", detail, attempts=ATTEMPTS)
+
+
+def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generator[Program, str, tuple[str, str]]:
+    """Takes an object from where the robot stands; returns why it did not, as a reason and in words."""
+    index = world.index(name)
+    _, yaw = world.base
+    start = pose.at(pose.before)
+    spheres = world.spheres(pose.fingers, pose.palm)
+    way = hand_path(world.obstacles([name]), spheres, world.grip(hand), start, entries(pose, yaw))
+    if way is None:
+        return "no_path", f"the hand has no way to {name}"
+    quat = world.body.turned(hand, pose.fingers, pose.palm)
+    lift = LIFT * UP * float(pose.palm @ UP > -0.9)
+    deep = vector3(pose.at(-BELOW))
+    reason = yield [
+        *travel(hand, way, quat),
+        Phase(hand=hand, pos=deep, quat=quat, until=Until.TOUCHED, object=index, close=False, limit=25, after="",
+              speed=0.03),
+        Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15, after="no_grasp",
+              speed=0.02),
+        *([Phase(hand=hand, pos=vector3(pose.at(0.0) + lift), keeps=index, close=True, tolerance=0.02, limit=10,
+                 after="", speed=0.03)] if lift.any() else []),
+        Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=True, tolerance=0.04, limit=30, after="",
+              speed=0.03),
+        *travel(hand, [p + lift for p in way[-2::-1]], None, keeps=index),
+        carry(world, hand, keeps=index, name=name),
+    ]  # fmt: skip
+    if name in world.held:
+        return "", ""
+    back = vector3(world.grip(hand) - pose.before * pose.palm)
+    yield [Phase(hand=hand, close=False, pos=back, limit=10, after=""), *travel(hand, way[-2::-1], None), *rest(hand)]
+    detail = f"the hand closed on {name} and does not hold it" if reason == "no_grasp" else ""
+    return reason or "slipped", detail
+
+
+def entries(pose: GraspPose, yaw: float) -> list[Vector]:
+    """Directions from which a hand of a robot that looks along `yaw` may come to a grasp: back to the robot, off the
+    object's side, up."""
+    return [-ahead(yaw), -pose.palm, UP]
+
+
+def _plan(world: PlannedWorld, name: str, hand: int, tried: Sequence[GraspPose]) -> tuple[Stance, GraspPose] | None:
+    """A stance and a pose from which the hand has a way, the most comfortable first; later attempts take others."""
+    obstacles, floor = world.obstacles([name]), world.floor()
+    poses = [p for p in grasp_poses(world, name, obstacles) if not any(_alike(p, t) for t in tried)]
+    if not poses:
+        return None
+    count = 0
+    points = np.array([p.point for p in poses])
+    for point in (world.com(name), *points[_spread(points, world.com(name))]):
+        for stance in world.stances(hand, point, floor, AWAY):
+            for pose in ordered(poses, stance.yaw)[:POSES]:
+                goal = pose.at(pose.before)
+                if not world.reaches(hand, stance, goal):
+                    continue
+                spheres = world.spheres(pose.fingers, pose.palm)
+                rests = world.resting(hand, stance)
+                if hand_path(obstacles, spheres, rests, goal, entries(pose, stance.yaw)) is not None:
+                    return stance, pose
+                count += 1
+                if count >= WAYS:
+                    return None
+    return None
+
+
+def _alike(one: GraspPose, other: GraspPose) -> bool:
+    return bool(np.linalg.norm(one.point - other.point) < 0.02 and one.palm @ other.palm > 0.9)
+
+
+def _spread(points: np.ndarray, centre: Vector) -> list[int]:
+    """Points of a large object that are far from its centre, and from each other, at most three."""
+    found: list[int] = []
+    for k in np.argsort(-np.linalg.norm(points[:, :2] - centre[:2], axis=1)):
+        if np.linalg.norm(points[k, :2] - centre[:2]) < 0.25 or len(found) == 3:
+            break
+        if all(np.linalg.norm(points[k, :2] - points[f, :2]) > 0.25 for f in found):
+            found.append(int(k))
+    return found
+
+
+def release(world: PlannedWorld, step: Step) -> Primitive:
+    """Opens the hand, wherever it is."""
+    hand = hand_with(world, step.object)
+    reason = yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=15), *rest(hand)]
+    return Outcome() if step.object not in world.held else Outcome(reason or "not_true_after", "the hand did not open")

@@ -1,0 +1,141 @@
+"""How a hand can take an object: poses from its convex pieces, as they lie now, with room for the hand around them.
+
+A pose is a point of the object's surface, the direction of the fingers along it, and that of the palm onto it. Rays go
+from many sides towards the centre of mass, and towards the middles of pieces where they miss.
+
+Axes: N candidates, S spheres of a hand, K pieces.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.world import PlannedWorld, Vector, hand_spheres
+
+UP = np.array([0.0, 0.0, 1.0])
+
+COMPASS = 8
+"""Horizontal directions that are tried."""
+
+DEPTH = 0.06
+"""m below an object's outermost point of a side that is still taken: not the bottom of a bowl."""
+
+BEFORE = (0.12, 0.06)
+"""m before a grasp from which on a hand comes straight to it, the best first."""
+
+AT_OBJECT = 0.6
+"""Share of the spheres' radii that keeps clear of others where the hand takes hold: its parts are thinner."""
+
+APART = 0.03
+"""m between points of a side."""
+
+MIDDLES = 8
+"""Pieces whose middles are aimed at, at most."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GraspPose:
+    """See the module's text; world frame.
+
+    Attributes:
+      point: of the surface, m. fingers, palm: unit vectors. before: m along -palm from which the hand comes straight.
+    """
+
+    point: Vector
+    fingers: Vector
+    palm: Vector
+    before: float
+
+    def at(self, away: float) -> Vector:
+        """A point above the surface, m along its normal."""
+        return self.point - away * self.palm
+
+    def discomfort(self, yaw: float) -> float:
+        """How far a hand of a robot that looks along `yaw` (rad) is turned from where it likes to be: palm down or
+        forwards, fingers forwards or upwards."""
+        ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+        palm = float(np.clip(1.0 - max(self.palm @ -UP, 0.85 * (self.palm @ ahead)), 0.0, 2.0))
+        fingers = float(np.clip(1.0 - max(self.fingers @ ahead, self.fingers @ UP), 0.0, 2.0))
+        return palm + 0.5 * fingers
+
+
+def sides() -> list[tuple[Vector, list[Vector]]]:
+    """Normals from which objects are taken, with the directions of fingers: from above, from all sides, and between."""
+    angles = np.arange(COMPASS) * (2 * np.pi / COMPASS)
+    level = [np.array([np.cos(a), np.sin(a), 0.0]) for a in angles]
+    found = [(UP, level)]
+    for normal in level:
+        across = np.cross(UP, normal)
+        found.append((normal, [UP, across, -across]))
+        slope = (normal + UP) / np.sqrt(2)
+        found.append((slope, [(UP - normal) / np.sqrt(2), across, -across]))
+    return found
+
+
+_SIDES = sides()
+
+
+def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[GraspPose]:
+    """Poses of a hand on an object with room for the hand there, from above first.
+
+    Args:
+      obstacles: everything but the object.
+    """
+    tables, index = world.domain.model.tables, world.index(name)
+    centre, corners = world.com(name), world.vertices(name)
+    middles = [world.vertices_of_pieces(np.array([p])).mean(0) for p in np.flatnonzero(tables.piece_object == index)]
+    middles.sort(key=lambda m: float(np.linalg.norm(m - centre)))
+    aims = np.array([centre, *middles[:MIDDLES]])
+    size = float(np.linalg.norm(np.ptp(corners, axis=0))) + 0.1
+    normals = np.array([normal for normal, _ in _SIDES])
+    origins = aims[None] + size * normals[:, None]
+    hits = obstacles.entries(origins.reshape(-1, 3), np.repeat(-normals, len(aims), axis=0), index)
+    points, fingers, palms = [], [], []
+    for (normal, ways), start, away in zip(_SIDES, origins, hits.reshape(len(normals), -1), strict=True):
+        outermost = float((corners @ normal).max())
+        taken: list[Vector] = []
+        for origin, hit in zip(start, away, strict=True):
+            point = origin - (hit if np.isfinite(hit) else 0.0) * normal
+            deep = not np.isfinite(hit) or point @ normal < outermost - DEPTH
+            if deep or any(np.linalg.norm(point - t) < APART for t in taken):
+                continue
+            taken.append(point)
+            for way in ways:
+                points.append(point)
+                fingers.append(way)
+                palms.append(-normal)
+    if not points:
+        return []
+    points, fingers, palms = np.array(points), np.array(fingers), np.array(palms)
+    before = np.where(_room(obstacles, points, fingers, palms, 0.0, AT_OBJECT), 0.0, -1.0)
+    for away in BEFORE:
+        still = np.flatnonzero(before == 0.0)
+        before[still[_room(obstacles, points[still], fingers[still], palms[still], away, 1.0)]] = away
+    return [GraspPose(points[k], fingers[k], palms[k], float(before[k])) for k in np.flatnonzero(before > 0)]
+
+
+def _room(
+    obstacles: Obstacles,
+    points: Float[np.ndarray, "N 3"],
+    fingers: Float[np.ndarray, "N 3"],
+    palms: Float[np.ndarray, "N 3"],
+    away: float,
+    share: float,
+) -> Bool[np.ndarray, "N"]:
+    """Whether hands have room so far above surfaces."""
+    if not len(points):
+        return np.zeros(0, bool)
+    spheres = np.stack([hand_spheres(f, p) for f, p in zip(fingers, palms, strict=True)])
+    centres = (points - away * palms)[:, None] + spheres[..., :3]
+    distance = obstacles.distance(centres.reshape(-1, 3)).reshape(centres.shape[:2])
+    return np.all(distance >= share * spheres[..., 3], axis=1)
+
+
+def ordered(poses: Sequence[GraspPose], yaw: float) -> list[GraspPose]:
+    """The most comfortable first, for a robot that looks along `yaw`, rad."""
+    return sorted(poses, key=lambda pose: pose.discomfort(yaw) + (0.2 if pose.before < BEFORE[0] else 0.0))

@@ -1,0 +1,217 @@
+"""Doors, drawers and lids: opened, closed, and opened further where they are in the way of a hand."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Generator
+
+import numpy as np
+
+from ig2mj.planning.joints import AJAR, OPEN_TO, FaceGrip, OpenableJoint, openable_joints
+from ig2mj.planning.moves import (
+    ABOVE,
+    ATTEMPTS,
+    RETREAT,
+    UP,
+    Primitive,
+    Program,
+    ahead,
+    free_hand,
+    go,
+    hand_path,
+    rest,
+    travel,
+    vector3,
+)
+from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.steps import Outcome, Step
+from ig2mj.planning.world import PlannedWorld, Stance, Vector
+
+STAND_OFF = 0.3
+"""m between the robot's axis and what moves with a joint."""
+
+AWAY = 0.7
+"""m that a base would like to be from the middle of a joint's way."""
+
+PUSH_IN, PRESS = 0.03, 0.004
+"""m behind a face that a hand goes for which takes hold of it, and which pushes it shut."""
+
+SHUT, MOVED = 0.01, 0.05
+"""Share of a joint's range up to which it counts as shut, and change of it after which the same way is tried again."""
+
+LAST = 0.1
+"""Share of a joint's range to which a hand on the edge of a door pulls it shut; it is pushed from there."""
+
+STANCES, WAYS = 20, 16
+"""Stances for each grip, and ways of a hand that are looked for, at most."""
+
+
+def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
+    """The primitive that opens, or closes."""
+
+    def set_open(world: PlannedWorld, step: Step) -> Primitive:
+        name, reason, detail = step.object, "no_grasp", ""
+        passed = dict[str, int]()
+        for attempt in range(2 * ATTEMPTS):
+            if world.facts.holds("open", name) == value:
+                return Outcome(attempts=max(attempt, 1))
+            joints = [j for j in joints_of(world, name) if value or j.fraction > SHUT]
+            if not joints:
+                return Outcome("no_grasp", f"{name} has no joints that open")
+            joint = min(joints, key=lambda j: passed.get(j.name, 0))  # of equals the first: the largest link
+            tried = passed.get(joint.name, 0)
+            reason, detail = yield from move_joint(world, joint, free_hand(world, tried), value, tried)
+            now = {j.name: j.fraction for j in joints_of(world, name)}
+            passed[joint.name] = tried + (abs(now[joint.name] - joint.fraction) < MOVED)
+        if world.facts.holds("open", name) == value:
+            return Outcome(attempts=2 * ATTEMPTS)
+        return Outcome(reason or "not_true_after", detail, attempts=2 * ATTEMPTS)
+
+    return set_open
+
+
+def joints_of(world: PlannedWorld, name: str) -> list[OpenableJoint]:
+    """Joints of an object that count for `open`, as they are now."""
+    return openable_joints(world.stage.scene, world.view, world.index(name), world.world)
+
+
+def open_around(world: PlannedWorld, name: str, attempt: int) -> Generator[Program, str, None]:
+    """Opens a door or drawer further that may keep a hand from an object, the nearest first."""
+    found = [j for c in world.facts.containers(name) if world.domain.opens(c) for j in joints_of(world, c)]
+    yield from _open_one(world, found, world.com(name), attempt)
+
+
+def open_into(world: PlannedWorld, where: str, attempt: int) -> Generator[Program, str, bool]:
+    """Opens a door or drawer of a container further; returns whether there was one to open."""
+    found = joints_of(world, where) if world.domain.opens(where) else []
+    return (yield from _open_one(world, found, None, attempt))
+
+
+def _open_one(
+    world: PlannedWorld, joints: list[OpenableJoint], near: Vector | None, attempt: int
+) -> Generator[Program, str, bool]:
+    shut = [j for j in joints if j.fraction < AJAR]
+    if not shut or all(world.held):
+        return False
+    if near is not None:
+        shut.sort(key=lambda j: float(np.linalg.norm(j.vertices.mean(0) - near)))
+    yield from move_joint(world, shut[attempt % len(shut)], free_hand(world), True)
+    return True
+
+
+def move_joint(
+    world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int = 0
+) -> Generator[Program, str, tuple[str, str]]:
+    """Opens or closes one door, drawer or lid; returns why it did not, as a reason and in words.
+
+    Args:
+      tried: ways that have failed, which are left out.
+    """
+    found = _plan(world, joint, hand, value, tried)
+    if found is None:
+        return "no_base", f"no free floor from which a hand can move {joint.name}"
+    if reason := (yield from go(world, found.stance)):
+        return reason, f"no way leads to where a hand can move {joint.name}"
+    program = _program(world, joint, hand, found)
+    if program is None:
+        return "no_path", f"the hand has no way to {joint.name}"
+    reason = yield program
+    yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=6, after=""), *rest(hand)]
+    return reason or "not_true_after", f"{joint.name} did not move far enough"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _JointPlan:
+    """How a hand moves a joint: from where, and for each place on the way the point and the normal of the face that it
+    is at. pulls: it takes hold of the face; else it pushes it."""
+
+    stance: Stance
+    places: list[FaceGrip]
+    pulls: bool
+
+
+def _ways(joint: OpenableJoint, value: bool) -> list[tuple[tuple[FaceGrip, ...], float, bool]]:
+    """Grips, share of the joint's range to which they move it, and whether the hand pulls: a door is pulled open by its
+    outer face or its edge, and pushed shut by its outer face. Where no floor is free before that, it is pulled by its
+    edge until it is nearly shut, or by its inner face until it is ajar."""
+    if value:
+        return [(joint.grips, OPEN_TO, True), (joint.edges, OPEN_TO, True), (joint.inner_grips, OPEN_TO, False)]
+    ways = [(joint.grips, 0.0, False)]
+    if joint.fraction > LAST + 0.1:
+        ways.append((joint.edges, LAST, True))
+    if joint.hinge and joint.fraction > AJAR + 0.1:
+        ways.append((joint.inner_grips, AJAR, True))
+    return [*ways, (joint.grips, 0.0, True)]
+
+
+def _plan(world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int) -> _JointPlan | None:
+    floor, obstacles = world.floor(), world.obstacles()
+    count, passed = 0, 0
+    for grips, fraction, pulls in _ways(joint, value):
+        sweep = joint.sweep(fraction)[:, :2]
+        for grip in grips:
+            places = joint.path(grip, fraction)
+            first, normal = places[0]
+            for stance in world.stances(hand, places[len(places) // 2][0], floor, AWAY, most=STANCES):
+                if grips is not joint.edges and (np.array([*stance.xy, first[2]]) - first) @ normal <= 0.0:
+                    continue  # the robot stands behind the face
+                if np.linalg.norm(sweep - np.array(stance.xy), axis=1).min() < STAND_OFF:
+                    continue
+                if not all(world.reaches(hand, stance, p) for p, _ in places):
+                    continue
+                count += 1
+                if count > WAYS:
+                    return None
+                spheres = world.spheres(_fingers(normal, pulls, hand), -normal)
+                before = first + ABOVE * normal
+                back = [-ahead(stance.yaw), normal, UP]
+                if hand_path(obstacles, spheres, world.resting(hand, stance), before, back) is None:
+                    continue
+                passed += 1
+                if passed > tried:
+                    return _JointPlan(stance, places, pulls)
+                break  # the next grip
+    return None
+
+
+def _fingers(normal: Vector, pulls: bool, hand: int) -> Vector:
+    """Fingers that pull lie upwards; those that push along the face, so that they do not enter the gap above a
+    drawer."""
+    across = UP - (UP @ normal) * normal
+    across = across / np.linalg.norm(across) if np.linalg.norm(across) > 0.3 else np.array([1.0, 0.0, 0.0])
+    if pulls:
+        return across
+    level = np.cross(normal, UP) * (1.0 if hand == 0 else -1.0)
+    return level / np.linalg.norm(level) if np.linalg.norm(level) > 0.5 else across
+
+
+def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointPlan) -> Program | None:
+    places, index = plan.places, joint.object_index
+    first, normal = places[0]
+    fingers = _fingers(normal, plan.pulls, hand)
+    quat = world.body.turned(hand, fingers, -normal)
+    _, yaw = world.base
+    before, back = first + ABOVE * normal, [-ahead(yaw), normal, UP]
+    way = hand_path(world.obstacles(), world.spheres(fingers, -normal), world.grip(hand), before, back)
+    if way is None:
+        return None
+    program = travel(hand, way, quat)
+    if not plan.pulls:  # an open hand pushes
+        program += [
+            Phase(hand=hand, pos=vector3(p - PRESS * n), close=False, tolerance=0.03, limit=12, after="", speed=0.04)
+            for p, n in places
+        ]
+        last = vector3(places[-1][0] - 2 * PRESS * places[-1][1])
+        program.append(Phase(hand=hand, pos=last, until=Until.WAITED, limit=6))
+    else:
+        program += [
+            Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), quat=quat, until=Until.TOUCHED, object=index,
+                  close=False, limit=20, after="", speed=0.03),
+            Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), until=Until.HELD, object=index, close=True,
+                  limit=15, after="no_grasp", speed=0.02),
+            *[Phase(hand=hand, pos=vector3(p), close=True, tolerance=0.05, limit=20, after="", keeps=index, speed=0.04)
+              for p, _ in places[1:]],
+            Phase(hand=hand, close=False, until=Until.EMPTY, limit=10, after=""),
+        ]  # fmt: skip
+    program.append(Phase(hand=hand, pos=vector3(places[-1][0] + RETREAT * places[-1][1]), limit=12, after=""))
+    return [*program, *rest(hand), Phase(until=Until.WAITED, limit=4)]

@@ -1,0 +1,96 @@
+"""Placing what a hand holds, so that a relation becomes true."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ig2mj.planning.moves import (
+    ATTEMPTS,
+    AWAY,
+    LET_GO,
+    RETREAT,
+    UP,
+    Primitive,
+    ahead,
+    go,
+    hand_path,
+    hand_with,
+    quaternion,
+    rest,
+    travel,
+    vector3,
+)
+from ig2mj.planning.opening import open_into
+from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.steps import Outcome, Step
+from ig2mj.planning.world import PlannedWorld, Spot, Stance
+
+SPARE = 0.03
+"""m before its place from which on an object may touch what is around."""
+
+STANCES, WAYS = 3, 60
+"""Stances for each spot, and ways of a hand that are looked for, at most."""
+
+
+def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
+    """The primitive that makes a placement true."""
+
+    def place(world: PlannedWorld, step: Step) -> Primitive:
+        name, where = step.arguments
+        hand = hand_with(world, name)
+        reason, detail = "no_base", f"no spot from which {predicate}({name}, {where}) would be true is in reach"
+        for attempt in range(ATTEMPTS):
+            found = _plan(world, predicate, name, where, hand)
+            if found is None:
+                if predicate == "inside" and (yield from open_into(world, where, attempt)):
+                    continue
+                break
+            stance, spot = found
+            if reason := (yield from go(world, stance)):
+                continue
+            if name not in world.held:
+                return Outcome("slipped", f"the hand lost {name}", attempts=attempt + 1)
+            _, yaw = world.base
+            fingers, palm = world.hand_axes(hand, rotation)
+            target, quat, rotation = world.grip_for(hand, name, spot)
+            target = target + LET_GO * UP
+            spheres = world.spheres(fingers, palm, holding=name, hand=hand, rotation=rotation)
+            way = hand_path(world.obstacles([name]), spheres, world.grip(hand), target, [UP, -ahead(yaw)], SPARE)
+            if way is None:
+                reason, detail = "no_path", f"the hand has no way with {name} to its place"
+                continue
+            keeps, turned = world.index(name), quaternion(quat)
+            reason = yield [
+                *travel(hand, way, turned, keeps=keeps),
+                Phase(hand=hand, pos=vector3(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1,
+                      limit=20, after="", speed=0.03),
+                Phase(hand=hand, close=False, until=Until.EMPTY, limit=10),
+                Phase(hand=hand, pos=vector3(target - RETREAT * palm), tolerance=0.04, limit=15, after=""),
+                *travel(hand, way[-2::-1], None),
+                *rest(hand),
+                Phase(until=Until.WAITED, limit=6),
+            ]  # fmt: skip
+            if world.facts.holds(predicate, name, where):
+                return Outcome(attempts=attempt + 1)
+            if name not in world.held:
+                return Outcome(reason or "not_true_after", f"{name} is not where it was put", attempts=attempt + 1)
+        return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
+
+    return place
+
+
+def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int) -> tuple[Stance, Spot] | None:
+    """A stance and a pose of the object's main body, of those with a way for the hand."""
+    obstacles, floor = world.obstacles([name]), world.floor()
+    tried = 0
+    for spot in world.spots(predicate, name, where):
+        target, _, rotation = world.grip_for(hand, name, spot)
+        spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+        for stance in world.stances(hand, target, floor, AWAY, most=STANCES):
+            back = [UP, -ahead(stance.yaw)]
+            if hand_path(obstacles, spheres, world.carried(hand, stance), target + LET_GO * UP, back, SPARE):
+                return stance, spot
+            tried += 1
+            if tried > WAYS:
+                return None
+    return None

@@ -1,0 +1,73 @@
+"""Primitives in physics: what the robot does for each, as programs that are planned on the host one after another.
+
+A primitive is a generator: it yields motion programs (`list[Phase]`), is sent the reason why each failed ("" for
+success), and returns its outcome. It plans every program from the world as it then is, tries again by itself with
+another stance, grasp or spot, and ends by the predicate that it is for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ig2mj.planning.grasping import grasp, release
+from ig2mj.planning.moves import AWAY, Primitive, PrimitiveFailed, go
+from ig2mj.planning.opening import set_open
+from ig2mj.planning.placing import place
+from ig2mj.planning.steps import Outcome, Step
+from ig2mj.planning.switching import toggle
+from ig2mj.planning.treatments import clean, cook, freeze, slice_, soak
+from ig2mj.planning.world import PlannedWorld
+
+
+def primitive(world: PlannedWorld, step: Step) -> Primitive:
+    """What a robot does for a step."""
+    action = ACTIONS.get(step.primitive)
+    if action is None:
+        return _refused(f"'{step.primitive}' is not carried out in physics; take --rung symbolic")
+    return _guarded(action(world, step))
+
+
+def _refused(detail: str) -> Primitive:
+    yield from ()
+    return Outcome("no_path", detail)
+
+
+def _guarded(inner: Primitive) -> Primitive:
+    try:
+        return (yield from inner)
+    except PrimitiveFailed as e:
+        return Outcome(e.reason, e.detail)
+
+
+def navigate_to(world: PlannedWorld, step: Step) -> Primitive:
+    """To where a hand reaches the object."""
+    point, reason = world.com(step.object), "no_base"
+    hands = range(len(world.body.hands))
+    for stance in world.stances(max(hands), point, world.floor(), AWAY):
+        reason = yield from go(world, stance)
+        if not reason:
+            return Outcome()
+    return Outcome(reason, f"{step.object} is not within reach of free floor" if reason == "no_base" else "")
+
+
+ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {
+    "navigate_to": navigate_to,
+    "grasp": grasp,
+    "release": release,
+    "place_on_top": place("on_top"),
+    "place_inside": place("inside"),
+    "place_next_to": place("next_to"),
+    "place_under": place("under"),
+    "place_on_floor": place("on_floor"),
+    "open": set_open(True),
+    "close": set_open(False),
+    "toggle_on": toggle(True),
+    "toggle_off": toggle(False),
+    "wipe": clean("dusty"),
+    "scrub": clean("stained"),
+    "soak": soak,
+    "slice": slice_,
+    "cook": cook,
+    "freeze": freeze,
+}
+"""Primitives that are carried out in physics."""

@@ -1,0 +1,91 @@
+"""Switching things on and off: a finger at the button."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ig2mj.planning.moves import (
+    ATTEMPTS,
+    AWAY,
+    DOWN,
+    UP,
+    Primitive,
+    ahead,
+    free_hand,
+    go,
+    hand_path,
+    rest,
+    travel,
+    vector3,
+)
+from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.steps import Outcome, Step
+from ig2mj.planning.world import PlannedWorld, Stance, Vector
+from ig2mj.scene.tables import LinkKind
+
+FINGER, NEAR_BUTTON = 0.06, 0.13
+"""m from a grasp point to the fingers' frames, and before a button at which a hand comes to it."""
+
+STANCES = 12
+"""That are tried."""
+
+
+def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
+    """The primitive that switches on, or off."""
+
+    def toggle(world: PlannedWorld, step: Step) -> Primitive:
+        name, reason, detail = step.object, "no_base", ""
+        tables = world.domain.model.tables
+        links = np.flatnonzero((tables.link_object == world.index(name)) & (tables.link_kind == LinkKind.TOGGLE_BUTTON))
+        if not len(links):
+            return Outcome("no_grasp", f"{name} has no button")
+        for attempt in range(ATTEMPTS):
+            if world.facts.holds("toggled_on", name) == value:
+                return Outcome(attempts=max(attempt, 1))
+            button = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
+            hand = free_hand(world, attempt)
+            found = _plan(world, button, hand, attempt)
+            if found is None:
+                reason, detail = "no_base", f"no free floor from which a hand reaches the button of {name}"
+                continue
+            stance, aim = found
+            if reason := (yield from go(world, stance)):
+                continue
+            _, yaw = world.base
+            fingers = ahead(yaw)
+            quat = world.body.turned(hand, fingers, DOWN)
+            way = hand_path(world.obstacles(), world.spheres(fingers), world.grip(hand), aim, [UP, -fingers])
+            if way is None:
+                reason, detail = "no_path", f"the hand has no way to the button of {name}"
+                continue
+            at = vector3(button - fingers * FINGER)
+            reason = yield [
+                *travel(hand, way, quat),
+                Phase(hand=hand, pos=at, quat=quat, until=Until.WAITED, limit=5, speed=0.03),
+                *travel(hand, way[::-1], None),
+                *rest(hand),
+            ]
+            detail = f"the fingers were not at the button of {name} for long enough"
+        if world.facts.holds("toggled_on", name) == value:
+            return Outcome(attempts=ATTEMPTS)
+        return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
+
+    return toggle
+
+
+def _plan(world: PlannedWorld, point: Vector, hand: int, attempt: int) -> tuple[Stance, Vector] | None:
+    """A stance, and a point near a button that a hand has a way to; from there the fingers go to the button."""
+    obstacles, floor = world.obstacles(), world.floor()
+    found = 0
+    for stance in world.stances(hand, point, floor, AWAY, most=STANCES):
+        fingers = ahead(stance.yaw)
+        for offset in (-fingers * (NEAR_BUTTON + FINGER), -DOWN * NEAR_BUTTON - fingers * FINGER):
+            aim = point + offset
+            rests = world.resting(hand, stance)
+            if hand_path(obstacles, world.spheres(fingers), rests, aim, [UP, -fingers]) is not None:
+                found += 1
+                if found > attempt:
+                    return stance, aim
+    return None
