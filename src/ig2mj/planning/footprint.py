@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Collection
 
 import mujoco
 import numpy as np
@@ -48,16 +49,18 @@ class BaseFootprint:
         return BaseFootprint(_merged([*self.discs, Disc(max(low, LOWEST), high, radius)]))
 
     @classmethod
-    def of_robot(cls, scene: Scene, view: PhysicsView, agent: int = 0, world: int = 0) -> BaseFootprint:
+    def of_robot(
+        cls, scene: Scene, view: PhysicsView, agent: int = 0, world: int = 0, without_hands: Collection[int] = ()
+    ) -> BaseFootprint:
         """That of a robot as it stands in a view.
 
         Args:
-          view: with a world axis; `world` of it. agent: number of the robot.
+          view: with a world axis; `world` of it. agent: number of the robot. without_hands: numbers of hands, among all
+            of the scene, that do not count.
         """
         model, tables = scene.model, scene.tables
-        geoms = np.flatnonzero(
-            (tables.body_agent[model.geom_bodyid] == agent) & ((model.geom_contype | model.geom_conaffinity) != 0)
-        )
+        counts = (tables.body_agent == agent) & ~np.isin(tables.body_hand, list(without_hands))
+        geoms = np.flatnonzero(counts[model.geom_bodyid] & ((model.geom_contype | model.geom_conaffinity) != 0))
         bodies = model.geom_bodyid[geoms]
         pos, quat = (np.asarray(a)[world, bodies] for a in (view.body_pos, view.body_quat))
         turn = matrices_on_host(quat)

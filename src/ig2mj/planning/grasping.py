@@ -6,10 +6,10 @@ from collections.abc import Generator, Sequence
 
 import numpy as np
 
+from ig2mj.planning.driving import go
 from ig2mj.planning.grasps import GraspPose, grasp_poses, ordered
 from ig2mj.planning.moves import (
     ATTEMPTS,
-    AWAY,
     BELOW,
     UP,
     Primitive,
@@ -17,7 +17,6 @@ from ig2mj.planning.moves import (
     ahead,
     carry,
     free_hand,
-    go,
     hand_path,
     hand_with,
     rest,
@@ -27,7 +26,7 @@ from ig2mj.planning.moves import (
 from ig2mj.planning.opening import open_around
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import PlannedWorld, Stance, Vector
+from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
 
 LIFT = 0.03
 """m that an object is lifted before it is drawn sideways."""

@@ -28,7 +28,7 @@ DEPTH = 0.06
 BEFORE = (0.12, 0.06)
 """m before a grasp from which on a hand comes straight to it, the best first."""
 
-AT_OBJECT = 0.6
+AT_OBJECT = 0.4
 """Share of the spheres' radii that keeps clear of others where the hand takes hold: its parts are thinner."""
 
 APART = 0.03

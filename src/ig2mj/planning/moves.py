@@ -12,9 +12,9 @@ from collections.abc import Generator, Sequence
 import numpy as np
 
 from ig2mj.planning.clearance import Obstacles, hand_way, straight
-from ig2mj.planning.phases import Base, Phase, Until
+from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome
-from ig2mj.planning.world import PlannedWorld, Stance, Vector
+from ig2mj.planning.world import PlannedWorld, Vector
 
 Program = list[Phase]
 Primitive = Generator[Program, str, Outcome]
@@ -28,9 +28,6 @@ ABOVE, BELOW = 0.12, 0.03
 LET_GO = 0.015
 """m above its place at which an object is let go."""
 
-AWAY = 0.55
-"""m that a base would like to be from what its hand does."""
-
 RETREAT = 0.12
 """m that a hand goes back after it has let go."""
 
@@ -43,32 +40,6 @@ class PrimitiveFailed(Exception):
 
     reason: str
     detail: str
-
-
-# Moving the base.
-
-
-def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
-    """Drives to a stance; returns the reason why it did not get there."""
-    here, yaw = world.base
-    apart = float(np.linalg.norm(here - stance.xy))
-    turned = abs((yaw - stance.yaw + np.pi) % (2 * np.pi) - np.pi)
-    if apart < 0.04 and turned < 0.1:
-        return ""
-    plan = world.floor().way(here, stance.xy)
-    if plan is None:
-        return "no_path"
-    return (yield drive(plan, stance.yaw))
-
-
-def drive(points: np.ndarray, yaw: float | None) -> Program:
-    """The program that follows a way, and at its end turns."""
-    program = [Phase(Base.DRIVE, xy=(float(x), float(y)), tolerance=0.08) for x, y in points[1:]]
-    if program:
-        program[-1] = dataclasses.replace(program[-1], tolerance=0.025)
-    if yaw is not None:
-        program.append(Phase(Base.TURN, yaw=float(yaw), turn_tolerance=0.06, limit=60))
-    return program
 
 
 # Hands.

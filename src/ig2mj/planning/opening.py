@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator
 
 import numpy as np
 
+from ig2mj.planning.driving import go
 from ig2mj.planning.joints import AJAR, OPEN_TO, FaceGrip, OpenableJoint, openable_joints
 from ig2mj.planning.moves import (
     ABOVE,
@@ -17,7 +18,6 @@ from ig2mj.planning.moves import (
     Program,
     ahead,
     free_hand,
-    go,
     hand_path,
     rest,
     travel,

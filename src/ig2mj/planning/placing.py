@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ig2mj.planning.driving import go
 from ig2mj.planning.moves import (
     ATTEMPTS,
-    AWAY,
     LET_GO,
     RETREAT,
     UP,
     Primitive,
     ahead,
-    go,
     hand_path,
     hand_with,
     quaternion,
@@ -28,7 +27,7 @@ from ig2mj.planning.world import PlannedWorld, Spot, Stance
 SPARE = 0.03
 """m before its place from which on an object may touch what is around."""
 
-STANCES, WAYS = 3, 60
+STANCES, WAYS = 4, 60
 """Stances for each spot, and ways of a hand that are looked for, at most."""
 
 
@@ -38,10 +37,12 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
     def place(world: PlannedWorld, step: Step) -> Primitive:
         name, where = step.arguments
         hand = hand_with(world, name)
-        reason, detail = "no_base", f"no spot from which {predicate}({name}, {where}) would be true is in reach"
+        reason, detail = "no_base", ""
         for attempt in range(ATTEMPTS):
             found = _plan(world, predicate, name, where, hand)
-            if found is None:
+            if isinstance(found, str):
+                reason = "no_path" if found == _NO_WAY else "no_base"
+                detail = f"{found} {predicate}({name}, {where}) would be true"
                 if predicate == "inside" and (yield from open_into(world, where, attempt)):
                     continue
                 break
@@ -51,8 +52,8 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             if name not in world.held:
                 return Outcome("slipped", f"the hand lost {name}", attempts=attempt + 1)
             _, yaw = world.base
-            fingers, palm = world.hand_axes(hand, rotation)
             target, quat, rotation = world.grip_for(hand, name, spot)
+            fingers, palm = world.hand_axes(hand, rotation)
             target = target + LET_GO * UP
             spheres = world.spheres(fingers, palm, holding=name, hand=hand, rotation=rotation)
             way = hand_path(world.obstacles([name]), spheres, world.grip(hand), target, [UP, -ahead(yaw)], SPARE)
@@ -79,18 +80,23 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
     return place
 
 
-def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int) -> tuple[Stance, Spot] | None:
-    """A stance and a pose of the object's main body, of those with a way for the hand."""
+_NO_SPOT, _NO_STANCE = "there is no room for a place where", "no free floor is in reach of a place where"
+_NO_WAY = "the hand has no way to a place where"
+
+
+def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int) -> tuple[Stance, Spot] | str:
+    """A stance and a pose of the object's main body, of those with a way for the hand; else what is lacking."""
     obstacles, floor = world.obstacles([name]), world.floor()
-    tried = 0
+    tried, lacking = 0, _NO_SPOT
     for spot in world.spots(predicate, name, where):
         target, _, rotation = world.grip_for(hand, name, spot)
         spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
-        for stance in world.stances(hand, target, floor, AWAY, most=STANCES):
-            back = [UP, -ahead(stance.yaw)]
+        lacking = _NO_STANCE if lacking == _NO_SPOT else lacking
+        for stance in world.stances(hand, target, floor, world.away(spheres), most=STANCES):
+            lacking, back = _NO_WAY, [UP, -ahead(stance.yaw)]
             if hand_path(obstacles, spheres, world.carried(hand, stance), target + LET_GO * UP, back, SPARE):
                 return stance, spot
             tried += 1
             if tried > WAYS:
-                return None
-    return None
+                return lacking
+    return lacking

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp, release
-from ig2mj.planning.moves import AWAY, Primitive, PrimitiveFailed, go
+from ig2mj.planning.moves import Primitive, PrimitiveFailed
 from ig2mj.planning.opening import set_open
 from ig2mj.planning.placing import place
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
 from ig2mj.planning.treatments import clean, cook, freeze, slice_, soak
-from ig2mj.planning.world import PlannedWorld
+from ig2mj.planning.world import AWAY, PlannedWorld
 
 
 def primitive(world: PlannedWorld, step: Step) -> Primitive:

@@ -6,15 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ig2mj.planning.driving import go
 from ig2mj.planning.moves import (
     ATTEMPTS,
-    AWAY,
     DOWN,
     UP,
     Primitive,
     ahead,
     free_hand,
-    go,
     hand_path,
     rest,
     travel,
@@ -22,7 +21,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import PlannedWorld, Stance, Vector
+from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
 from ig2mj.scene.tables import LinkKind
 
 FINGER, NEAR_BUTTON = 0.06, 0.13

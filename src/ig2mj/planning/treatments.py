@@ -8,16 +8,15 @@ from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
+from ig2mj.planning.driving import go
 from ig2mj.planning.moves import (
     ATTEMPTS,
-    AWAY,
     DOWN,
     UP,
     Primitive,
     Program,
     ahead,
     carry,
-    go,
     hand_path,
     hand_with,
     travel,
@@ -25,7 +24,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import DirtSpot, PlannedWorld, Stance, Vector, about_vertical
+from ig2mj.planning.world import AWAY, DirtSpot, PlannedWorld, Stance, Vector, about_vertical
 from ig2mj.scene.tables import LinkKind
 
 # Water, dirt, heat and cold.

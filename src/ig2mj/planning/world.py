@@ -39,6 +39,9 @@ BODY = 0.24
 APART = 0.12
 """m between stances for the same point, at least."""
 
+AWAY, FARTHEST = 0.55, 0.95
+"""m, horizontal, that a base would like to be from what its hand does, and from where it puts what is large."""
+
 EACH = 3
 """Spots of a placement in each area of its rule."""
 
@@ -199,16 +202,40 @@ class PlannedWorld:
         frame = frame if rotation is None else rotation @ frame
         return frame[:, 1] * (1.0 if hand == 0 else -1.0), frame[:, 2]
 
-    def floor(self) -> FreeFloor:
-        """Where the robot can stand with what it holds."""
-        footprint = BaseFootprint.of_robot(self.stage.scene, self.view, self.stage.agent, self.world)
+    def floor(self, holding: bool = False) -> FreeFloor:
+        """Where the robot can stand, without regard to what it holds.
+
+        Args:
+          holding: in any direction with what it holds.
+        """
+        view, number = self.view, self.world
+        held = [n if n and not self.domain.fixed(n) else "" for n in self.held]
+        busy = [] if holding else [int(self.body.hands[h]) for h, name in enumerate(held) if name]
+        footprint = BaseFootprint.of_robot(self.stage.scene, view, self.stage.agent, number, busy)
         here, _ = self.base
-        held = [n for n in self.held if n and not self.domain.fixed(n)]
-        for name in held:
+        for name in filter(None, held if holding else []):
             corners = self.vertices(name)
             away = float(np.linalg.norm(corners[:, :2] - here, axis=1).max())
             footprint = footprint.holding(float(corners[:, 2].min()), float(corners[:, 2].max()), away)
-        return self.planner.floor(self.view, footprint, without=[self.index(n) for n in held], world=self.world)
+        return self.planner.floor(view, footprint, without=[self.index(n) for n in held if n], world=number)
+
+    def clear_with_held(self, stances: Sequence[Stance]) -> bool:
+        """Whether what the robot holds, carried as it is now, meets nothing where the robot stands."""
+        held = [(h, n) for h, n in enumerate(self.held) if n and not self.domain.fixed(n)]
+        obstacles = self.obstacles([n for _, n in held])
+        here, now = self.base
+        for hand, name in held:
+            spheres = self.spheres(*self.hand_axes(hand), holding=name, hand=hand)
+            points = spheres[:, :3] + self.grip(hand) - np.array([*here, 0.0])
+            for stance in stances:
+                there = points @ about_vertical(stance.yaw - now).T + np.array([*stance.xy, 0.0])
+                if not obstacles.clear(np.concatenate([there, spheres[:, 3:]], axis=1)):
+                    return False
+        return True
+
+    def away(self, spheres: Float[np.ndarray, "S 4"]) -> float:
+        """m, horizontal, that a base would like to be from where a hand puts what it holds, whose spheres these are."""
+        return float(min(AWAY + max(np.linalg.norm(spheres[:, :2], axis=1).max() - ALONG[-1], 0.0), FARTHEST))
 
     def carry(self, hand: int, name: str = "") -> Vector:
         """Where a hand carries an object, "": what it holds, in the body's frame: as far ahead as that is wide."""

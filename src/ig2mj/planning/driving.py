@@ -1,0 +1,85 @@
+"""Driving to where a primitive is carried out, with what the hands hold.
+
+What is held turns with the robot. Where there is no room to turn with it, the robot turns farther off and comes the
+last part of the way straight ahead, and it backs off straight before it turns again.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Generator
+
+import numpy as np
+
+from ig2mj.planning.motion_planner import FreeFloor
+from ig2mj.planning.moves import Program
+from ig2mj.planning.occupancy import RESOLUTION
+from ig2mj.planning.phases import Base, Phase
+from ig2mj.planning.world import PlannedWorld, Stance
+
+BACK = np.arange(0.0, 1.25, 0.1)
+"""m before a stance at which there may be room to turn."""
+
+STEP = 0.1
+"""m between stances at which what is held is checked."""
+
+
+def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
+    """Drives to a stance; returns the reason why it did not get there."""
+    here, yaw = world.base
+    apart = float(np.linalg.norm(here - stance.xy))
+    turned = abs((yaw - stance.yaw + np.pi) % (2 * np.pi) - np.pi)
+    if apart < 0.04 and turned < 0.1:
+        return ""
+    standing = world.floor()
+    if not any(n and not world.domain.fixed(n) for n in world.held):
+        way = standing.way(here, stance.xy)
+        return "no_path" if way is None else (yield drive(way, stance.yaw))
+    if apart < 0.3 and turned < 0.3 and world.clear_with_held(_between(Stance((here[0], here[1]), yaw), stance)):
+        return (yield [shift(stance)])
+    turning = world.floor(holding=True)
+    start = _backed(world, Stance((float(here[0]), float(here[1])), yaw), standing, turning)
+    end = _backed(world, stance, standing, turning)
+    way = None if start is None or end is None else turning.way(start.xy, end.xy)
+    if way is None:  # what is held may touch something on the way
+        way = standing.way(here, stance.xy)
+        return "no_path" if way is None else (yield drive(way, stance.yaw))
+    assert start is not None and end is not None
+    program = [] if start.xy == (here[0], here[1]) else [shift(start)]
+    program += drive(way, stance.yaw)
+    return (yield program if end.xy == stance.xy else [*program, shift(stance)])
+
+
+def _backed(world: PlannedWorld, stance: Stance, standing: FreeFloor, turning: FreeFloor) -> Stance | None:
+    """The nearest stance straight behind one where there is room to turn, with free floor up to there."""
+    back = -np.array([np.cos(stance.yaw), np.sin(stance.yaw)])
+    for apart in BACK:
+        x, y = np.array(stance.xy) + apart * back
+        there = Stance((float(x), float(y)), stance.yaw)
+        if apart > 0 and standing.nearest(there.xy, RESOLUTION) is None:
+            return None
+        if turning.nearest(there.xy, RESOLUTION) is None:
+            continue
+        return there if apart == 0 or world.clear_with_held(_between(there, stance)) else None
+    return None
+
+
+def _between(start: Stance, end: Stance) -> list[Stance]:
+    count = max(2, int(np.linalg.norm(np.subtract(end.xy, start.xy)) / STEP) + 1)
+    points = np.linspace(start.xy, end.xy, count)
+    return [Stance((float(x), float(y)), end.yaw) for x, y in points]
+
+
+def drive(points: np.ndarray, yaw: float | None) -> Program:
+    """The program that follows a way, and at its end turns."""
+    program = [Phase(Base.DRIVE, xy=(float(x), float(y)), tolerance=0.08) for x, y in points[1:]]
+    if program:
+        program[-1] = dataclasses.replace(program[-1], tolerance=0.025)
+    if yaw is not None:
+        program.append(Phase(Base.TURN, yaw=float(yaw), turn_tolerance=0.06, limit=60))
+    return program
+
+
+def shift(stance: Stance) -> Phase:
+    """Goes straight to a stance without turning to its way."""
+    return Phase(Base.SHIFT, xy=stance.xy, yaw=stance.yaw, tolerance=0.025, turn_tolerance=0.06)
