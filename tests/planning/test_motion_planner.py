@@ -9,9 +9,9 @@ from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.planning import execution
 from ig2mj.planning.bodies import body_of
 from ig2mj.planning.clearance import Obstacles, hand_way, straight
+from ig2mj.planning.driving import drive
 from ig2mj.planning.footprint import BaseFootprint, Disc
 from ig2mj.planning.motion_planner import MotionPlanner
-from ig2mj.planning.moves import drive
 from ig2mj.planning.phases import Base, Phase, Programs, Until
 from ig2mj.planning.stage import CoreStage
 from ig2mj.sampling.query import SceneQuery
