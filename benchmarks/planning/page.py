@@ -1,9 +1,11 @@
 """`docs/notes/planned_activities.md`: which activities are solved on which rung, from rows of `activities.py`.
 
     python -m benchmarks.planning.page --rows FOLDER     takes rows in, in place of what is known of their activities
+    python -m benchmarks.planning.page --requests FILE   takes in rows of `ig2mj plan --benchmark --out FILE`
     python -m benchmarks.planning.page                   writes the page from what was taken in before
 
-What is taken in is one line for each activity in benchmarks/results/planning/<rung>.jsonl.
+What is taken in is one line for each activity in benchmarks/results/planning/<rung>.jsonl, and one for each primitive
+in requests.jsonl next to them.
 """
 
 from __future__ import annotations
@@ -18,10 +20,12 @@ from typing import Any
 
 from benchmarks.harness.paths import RESULTS, ROOT
 from benchmarks.planning.activities import RUNGS, read_rows
+from ig2mj.cli.common.plan_benchmark import COLUMNS, figure_cells, primitive_figures
 from ig2mj.planning.steps import PRIMITIVES, REASONS
 
 FOLDER = RESULTS / "planning"
 PAGE = ROOT / "docs" / "notes" / "planned_activities.md"
+REQUESTS = "requests.jsonl"
 ENOUGH = 0.8
 """Share of starts with which an activity counts as solved."""
 SHOWN = 2
@@ -35,6 +39,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
     )
     parser.add_argument("--rows", type=pathlib.Path, nargs="*", default=(), help="folders of `activities.py --out`")
+    parser.add_argument(
+        "--requests", type=pathlib.Path, nargs="*", default=(), help="files of `ig2mj plan --benchmark`"
+    )
     parser.add_argument("--results", type=pathlib.Path, default=FOLDER)
     parser.add_argument("--page", type=pathlib.Path, default=PAGE)
     args = parser.parse_args()
@@ -42,8 +49,10 @@ def main() -> None:
         files = [file for folder in args.rows if (file := folder / f"{rung}.jsonl").is_file()]
         if files:
             take_in(read_rows(files), args.results / f"{rung}.jsonl")
+    if args.requests:
+        take_in_requests([row for file in args.requests for row in read_lines(file)], args.results / REQUESTS)
     kept = {rung: read_lines(args.results / f"{rung}.jsonl") for rung in RUNGS}
-    args.page.write_text(page(kept), encoding="utf-8")
+    args.page.write_text(page(kept, read_lines(args.results / REQUESTS)), encoding="utf-8")
     print(args.page)
 
 
@@ -111,10 +120,25 @@ def condensed(name: str, rows: Sequence[Row]) -> Row:
     }
 
 
+def take_in_requests(rows: Sequence[Row], file: pathlib.Path) -> None:
+    """Replaces the lines of the rows' rungs and primitives."""
+    known = {(line["conditions"]["rung"], line["primitive"]): line for line in read_lines(file)}
+    for conditions in {json.dumps(row["conditions"], sort_keys=True) for row in rows}:
+        own = [row for row in rows if json.dumps(row["conditions"], sort_keys=True) == conditions]
+        for primitive in PRIMITIVES:
+            if figures := primitive_figures(own, primitive):
+                said = {key: sorted({row[key] for row in own}) for key in ("commit", "command")}
+                line = {"primitive": primitive, "conditions": own[0]["conditions"], **figures}
+                line |= {"commits": said["commit"], "commands": said["command"], "versions": own[-1]["versions"]}
+                known[own[0]["conditions"]["rung"], primitive] = line
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text("".join(json.dumps(known[key]) + "\n" for key in sorted(known)), encoding="utf-8")
+
+
 # From lines to the page.
 
 
-def page(kept: dict[str, list[Row]]) -> str:
+def page(kept: dict[str, list[Row]], requests: Sequence[Row] = ()) -> str:
     """The page's text."""
     kept = {rung: lines for rung, lines in kept.items() if lines}
     conditions = next((lines[0]["conditions"] for lines in kept.values()), {})
@@ -149,9 +173,10 @@ def page(kept: dict[str, list[Row]]) -> str:
         "",
         *_primitives(kept),
         "",
+        *_requests(requests),
         "## Provenance",
         "",
-        *_provenance(kept),
+        *_provenance(kept, requests),
         "",
     ]
     return "\n".join(lines)
@@ -255,8 +280,38 @@ def _primitives(kept: dict[str, list[Row]]) -> list[str]:
     return _table(head, rows)
 
 
-def _provenance(kept: dict[str, list[Row]]) -> list[str]:
+def _requests(lines: Sequence[Row]) -> list[str]:
+    """The section on requests; none where none were measured."""
+    if not lines:
+        return []
+    asked = max(line["asked"] for line in lines)
     rows = []
+    for line in sorted(
+        lines, key=lambda x: (RUNGS.index(x["conditions"]["rung"]), list(PRIMITIVES).index(x["primitive"]))
+    ):
+        rows.append((line["conditions"]["rung"], *figure_cells(line["primitive"], line)))
+    return [
+        "## Primitives, asked by themselves",
+        "",
+        f"`ig2mj plan --benchmark`: {asked} requests to each primitive, drawn in all homes by a seed; infeasible ones",
+        "are not left out. *prepared*: what must hold first could be made to hold (the object is in a hand, ...).",
+        "*has a solution*: share of the prepared ones that the symbolic rung, or this rung, carries out. *first try*",
+        "and *with retries*: of those. *median* and *95 %*: processor seconds of planning. *failures*: of those with",
+        "a solution.",
+        "",
+        *_table(("rung", *(c.replace("?", "") for c in COLUMNS)), rows),
+        "",
+    ]
+
+
+def _provenance(kept: dict[str, list[Row]], requests: Sequence[Row]) -> list[str]:
+    rows = []
+    for rung in RUNGS:
+        own = [line for line in requests if line["conditions"]["rung"] == rung]
+        for key in ("commits", "commands"):
+            found = sorted({value for line in own for value in line[key]})
+            if found:
+                rows.append((f"{rung}, requests", key, ", ".join(f"`{value}`" for value in found)))
     for rung, lines in kept.items():
         for key in ("commits", "commands", "dates"):
             found = sorted({value for line in lines for value in line[key]})

@@ -11,15 +11,19 @@ import argparse
 import time
 import traceback
 import warnings
-from typing import Any
+from collections.abc import Iterator, Sequence
 
-from ig2mj.cli.common.solving import Options, StepTable, solved
+from ig2mj.agents.registry import make_robot
 from ig2mj.cluster.reporting import end_with_parent, report
+from ig2mj.demos.solving import Episodes
 from ig2mj.errors import Ig2mjError
 from ig2mj.planning.domain import Domain
+from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.problem import Problem, problem_of
 from ig2mj.planning.results import row_of
-from ig2mj.planning.task_planner import TaskPlanner
+from ig2mj.planning.solver import EpisodeResult, StepRecord, solve
+from ig2mj.planning.symbolic import symbolic_episodes
+from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
 
 SAMPLED_TOGETHER = 10
 """Start states that are kept on disk together while they are sampled."""
@@ -60,26 +64,12 @@ def sample(problem: Problem, split: str, count: int) -> None:
 
 def solve_starts(problem: Problem, args: argparse.Namespace) -> None:
     """Solves the starts one after another. An error of one is its result."""
-    from ig2mj.agents.registry import make_robot
-
     planner = TaskPlanner(Domain(problem.model, make_robot(args.robot).hand_count), problem.goal)
     left = list(args.starts)
-    pool = problem.pool(args.split, max(args.count, max(left) + 1))
-    options = Options(
-        robot=args.robot,
-        worlds=1,
-        symbolic=args.rung == "symbolic",
-        doors_open=args.doors == "open",
-        seed=args.seed,
-        seconds=args.seconds,
-        record=None,
-        video=None,
-    )
-    reporter = _Reporter(problem.name, silent=True)
     while left:
         began = time.process_time()
         try:
-            for number, result in solved(problem, planner, pool, tuple(left), options, reporter):
+            for number, result in episodes(problem, planner, tuple(left), args):
                 left.remove(number)
                 spent = round(time.process_time() - began, 2)
                 report(event="row", start=number, home=problem.scene.name, processor=spent, result=row_of(result))
@@ -91,17 +81,30 @@ def solve_starts(problem: Problem, args: argparse.Namespace) -> None:
             report(event="failed", start=left.pop(0), home=problem.scene.name, why=why)
 
 
-class _Reporter(StepTable):
-    """Reports what begins."""
+def episodes(
+    problem: Problem, planner: TaskPlanner, numbers: Sequence[int], args: argparse.Namespace
+) -> Iterator[tuple[int, EpisodeResult]]:
+    """Solves starts; their numbers and results."""
+    at = numbers[0]
 
-    number = -1
+    def watch(world: int, plan: TaskPlan, records: Sequence[StepRecord]) -> None:
+        report(event="step", start=at, step=str(plan.steps[0]) if plan.steps else "")
 
-    def begin(self, number: int) -> None:
-        self.number = number
-        report(event="begin", start=number)
+    if args.rung == "symbolic":
+        pool = problem.pool(args.split, max(args.count, max(numbers) + 1))
+        for at, rung in symbolic_episodes(planner.domain, problem.scene, pool, numbers, args.seed):
+            report(event="begin", start=at)
+            yield at, solve(planner, rung, seconds=args.seconds, watch=watch)[0]
+        return
 
-    def watch(self, world: int, plan: Any, records: Any) -> None:
-        report(event="step", start=self.number, step=str(plan.steps[0]) if plan.steps else "")
+    def begun(numbers: Sequence[int], rung: PhysicsRung) -> None:
+        nonlocal at
+        at = numbers[0]
+        report(event="begin", start=at)
+
+    options = {"robot": args.robot, "split": args.split, "seed": args.seed, "doors_open": args.doors == "open"}
+    with Episodes(problem, planner, numbers, **options) as found:
+        yield from found.solve(seconds=args.seconds, watch=watch, begun=begun)
 
 
 if __name__ == "__main__":

@@ -1,18 +1,21 @@
-"""`ig2mj plan ACTIVITY|SCENE [GOAL]`: the steps with which a robot reaches a goal, without carrying them out."""
+"""`ig2mj plan ACTIVITY|SCENE [GOAL]`: the steps with which a robot reaches a goal, without carrying them out.
+
+`ig2mj plan --benchmark`: how often each primitive succeeds.
+"""
 
 from __future__ import annotations
 
 import pathlib
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
 from ig2mj.cli.common.objects import AddedObjects
-from ig2mj.cli.common.planning import Goal, What
+from ig2mj.cli.common.planning import Goal, WhatIfAny
 
 
 def run(
-    what: What,
+    what: WhatIfAny = None,
     goal: Goal = None,
     robot: str = "humanoid",
     split: str = "held_out",
@@ -20,10 +23,18 @@ def run(
     object: AddedObjects = (),
     pddl: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FOLDER")] = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    benchmark: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    rung: Literal["symbolic", "kinematic", "physics"] = "physics",
+    requests: int = 200,
+    primitives: tuple[str, ...] = (),
+    seed: int = 0,
+    jobs: int = 1,
+    seconds: float = 600.0,
+    out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
 ) -> int:
-    """Print the steps that reach a goal from a start state.
+    """Print the steps that reach a goal from a start state; or measure how often each primitive succeeds.
 
-    The exit status is 0 if there is a plan, or nothing is left to do.
+    The exit status is 0 if there is a plan, or nothing is left to do; with --benchmark, if all requests were measured.
 
     Args:
       what: an activity (`ig2mj activity list`), or the name or folder of a home.
@@ -34,7 +45,27 @@ def run(
       object: with a home: {object}.
       pddl: also write domain.pddl and problem.pddl to this folder, for planners that read PDDL.
       json: print JSON instead of a table.
+      benchmark: draw requests to each primitive in all homes that ship, and carry them out. Requests that have no
+        solution are not left out; their share is reported. The options below are for it.
+      rung: what carries them out (docs/guide/planning.md).
+      requests: number for each primitive.
+      primitives: only these.
+      seed: of the requests.
+      jobs: processes; 0: one per processor.
+      seconds: wall time of a request, after which it counts as failed.
+      out: file of results, one line of JSON for each request; requests that it holds already are not repeated.
     """
+    if benchmark:
+        from ig2mj.cli.common.plan_benchmark import benchmark as measured
+        from ig2mj.errors import Ig2mjError
+
+        if what is not None or goal is not None or object or pddl is not None:
+            raise Ig2mjError("--benchmark draws its own requests: leave out activity, home, goal, --object and --pddl")
+        return measured(rung, robot, requests, primitives, seed, jobs, seconds, out, json)
+    if what is None:
+        from ig2mj.errors import Ig2mjError
+
+        raise Ig2mjError("name an activity (ig2mj activity list), or a home and a goal; or measure with --benchmark")
     from ig2mj.cli.common.objects import note_changes
     from ig2mj.cli.common.planning import check_row, domain_of
     from ig2mj.cli.common.printing import make_table, print_json, stdout_console

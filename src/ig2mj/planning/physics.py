@@ -6,6 +6,8 @@ that have nothing to do stand still.
 
 from __future__ import annotations
 
+import dataclasses
+import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -62,7 +64,7 @@ class PhysicsRung:
         self._asked: list[Step | None] = [None] * count
         self._programs: list[Program] = [[] for _ in range(count)]
         self._carry = execution.begin(self._programs)
-        self._count, self._steps = [0] * count, [0] * count
+        self._count, self._steps, self._planning = [0] * count, [0] * count, [0.0] * count
         self._ended: dict[int, Outcome] = {}
         self.watch: Callable[[], None] = lambda: None
 
@@ -82,22 +84,24 @@ class PhysicsRung:
 
     def begin(self, world: int, step: Step) -> None:
         self._count[world] += 1
-        self._steps[world] = 0
+        self._steps[world], self._planning[world] = 0, 0.0
         self._asked[world] = step
         self._running[world] = primitive(self.world(world), step)
         self._next(world, None)
 
     def _next(self, world: int, reason: str | None) -> None:
         """The next program of a world's primitive, or its outcome."""
-        running = self._running[world]
+        running, began = self._running[world], time.process_time()
         assert running is not None
         try:
             program = next(running) if reason is None else running.send(reason)
             while not program:
                 program = running.send("")
         except StopIteration as end:
+            self._planning[world] += time.process_time() - began
             self._end(world, end.value)
             return
+        self._planning[world] += time.process_time() - began
         self._follow(world, program)
 
     def _follow(self, world: int, program: Program) -> None:
@@ -111,7 +115,7 @@ class PhysicsRung:
         self._running[world] = None
         self._follow(world, [])
         seconds = self._steps[world] * ACTION_PERIOD
-        self._ended[world] = Outcome(outcome.reason, outcome.detail, seconds, outcome.attempts)
+        self._ended[world] = dataclasses.replace(outcome, time=seconds, planning=self._planning[world])
 
     def elapsed(self, world: int) -> float:
         """Simulated seconds of a world's present primitive, or of its last one."""

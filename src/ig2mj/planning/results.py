@@ -59,6 +59,7 @@ def row_of(result: EpisodeResult) -> dict[str, Any]:
             "detail": r.outcome.detail,
             "time": r.outcome.time,
             "attempts": r.outcome.attempts,
+            "planning": round(r.outcome.planning, 4),
             "seconds": round(r.seconds, 3),
         }
         for r in result.steps
@@ -80,7 +81,7 @@ def result_of(row: Mapping[str, Any]) -> EpisodeResult:
     steps = tuple(
         StepRecord(
             Step(s["primitive"], tuple(s["arguments"])),
-            Outcome(s["reason"], s["detail"], s["time"], s["attempts"]),
+            Outcome(s["reason"], s["detail"], s["time"], s["attempts"], s.get("planning", 0.0)),
             s["seconds"],
         )
         for s in row["steps"]

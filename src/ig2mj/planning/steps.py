@@ -157,12 +157,14 @@ class Outcome:
     Attributes:
       reason: a key of `REASONS`, or "" for success. detail: more about a failure, in words.
       time: simulated seconds that it took. attempts: tries within the primitive.
+      planning: processor seconds that planning its motion took.
     """
 
     reason: str = ""
     detail: str = ""
     time: float = 0.0
     attempts: int = 1
+    planning: float = 0.0
 
     @property
     def done(self) -> bool:

@@ -102,7 +102,9 @@ class SymbolicRung:
         """What of the primitive's preconditions is false, in words."""
         name, kind = step.object, step.primitive
         second = step.arguments[1] if len(step.arguments) > 1 else ""
-        shut = [c for c in facts.containers(name) if name not in held and not facts.holds("open", c)]
+        acting = second if kind in ("cook", "freeze") else ""  # it acts on what is shut in it
+        around = facts.containers(name) if name not in held and kind not in ("navigate_to", "release") else ()
+        shut = [c for c in around if c != acting and not facts.holds("open", c)]
         if kind == "grasp":
             if name in held:
                 return f"a hand holds {name} already"
@@ -124,7 +126,7 @@ class SymbolicRung:
             return f"{second} is not open"
         if kind in ("cook", "freeze") and (why := self._not_acting(name, second, facts, held)):
             return why
-        if shut and kind not in ("release",):
+        if shut:
             return f"{name} is shut in {', '.join(shut)}"
         return ""
 

@@ -82,9 +82,6 @@ RANDOM_CELLS = 96
 MANY_CELLS = 3_000_000
 """Where none of the first will do, as many candidates are looked at as make this number of cells under the object."""
 
-SPOT_CELLS = 300_000
-"""The same for positions that are only planned with: other ones will do where none is found here."""
-
 NOWHERE = frozenset(("no surface", "no room", "not supported"))
 """Reasons of candidates that were not even let go. Where `DRAWS` orientations meet no others, none ever will."""
 
@@ -273,7 +270,7 @@ class Placer:
         """
         shape = self.query.footprint(object_index, quat, rng.uniform(-CELL / 2, CELL / 2, 2))
         for area in itertools.islice(areas(shape, rng), most):
-            rest = self._candidates(object_index, rng, collections.Counter(), shape, area, support, SPOT_CELLS)
+            rest = self._candidates(object_index, rng, collections.Counter(), shape, area, support)
             for n in rng.permutation(len(rest.row))[:each]:
                 yield origin(shape, int(rest.row[n]), int(rest.col[n]), float(rest.height[n]))
 
@@ -285,7 +282,6 @@ class Placer:
         shape: Footprint,
         area: PlacementArea,
         support: str,
-        many_cells: int = MANY_CELLS,
     ) -> Rest:
         """Candidates that pass the tests on columns; first of a few cells drawn at random, else of many."""
         cells = ColumnWindow.around(area.low, area.high)
@@ -297,7 +293,7 @@ class Placer:
             every = every[area.allowed(cells.row + every // cells.cols, cells.col + every % cells.cols)]
         if support == "loose" and area.loose:
             every = every[self._over(shape, cells, area.supports).ravel()[every]]
-        many = many_cells // max(int(shape.covered.sum()), 1)
+        many = MANY_CELLS // max(int(shape.covered.sum()), 1)
         few = len(every) <= RANDOM_CELLS
         wanted = "balanced" if support == "loose" and not area.loose else support
         supports = area.supports if support == "full" else (*area.supports, *area.contents)

@@ -83,11 +83,11 @@ def follow(title: str) -> Iterator[ProgressCallback]:
         yield report
 
 
-def tell_failures(failed: Mapping[str, str], total: int) -> None:
-    """Lists failed jobs with their reasons on standard error."""
+def tell_failures(failed: Mapping[str, str], total: int, again: str = "--resume") -> None:
+    """Lists failed jobs with their reasons on standard error. `again`: what tries them again."""
     if not failed:
         return
-    print(f"{len(failed)} of {total} jobs failed; --resume tries them again:", file=sys.stderr)
+    print(f"{len(failed)} of {total} jobs failed; {again} tries them again:", file=sys.stderr)
     for name, reason in list(failed.items())[:LISTED]:
         print(f"  {name}: {reason}", file=sys.stderr)
     if len(failed) > LISTED:

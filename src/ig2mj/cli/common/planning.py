@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ig2mj.planning.problem import Problem
 
 What = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ACTIVITY|SCENE")]
+WhatIfAny = Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="ACTIVITY|SCENE")]
 Goal = Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="GOAL")]
 
 

@@ -1,0 +1,228 @@
+"""Carries out drawn requests to primitives (`ig2mj.planning.requests`) in one home, each from the home's start.
+
+A request is *prepared* if what must hold first could be sampled and taken into the hands. It *has a solution* if the
+symbolic rung carries it out from the same state (the sampler finds a state in which the primitive's condition holds),
+or the rung that is measured does.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import signal
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from ig2mj.agents.registry import make_robot
+from ig2mj.envs.planning_stage import DOORS_SETTLE
+from ig2mj.errors import AbilityError, StateError
+from ig2mj.planning.domain import Domain
+from ig2mj.planning.facts import Facts
+from ig2mj.planning.physics import PhysicsRung
+from ig2mj.planning.requests import KIT, MEASURED, Request, RequestSource
+from ig2mj.planning.rung import Rung
+from ig2mj.planning.starts import open_doors, start_place
+from ig2mj.planning.steps import Outcome, PlanningError, Step
+from ig2mj.planning.symbolic import SymbolicRung
+from ig2mj.process import entry_point
+from ig2mj.sampling.conditions import Condition
+from ig2mj.sampling.many import make_sampler
+from ig2mj.sampling.placement import Budget
+from ig2mj.sampling.query import SceneQuery
+from ig2mj.sampling.row import Row
+from ig2mj.scene.paths import shipped_homes
+from ig2mj.scene.scene import load_scene
+from ig2mj.simulation.robots import put_row
+from ig2mj.simulation.simulation import Simulation
+
+RUNGS = ("symbolic", "physics")
+"""Rungs that can be measured."""
+
+DRAWS, WORK = 20, 400
+"""Draws until a home has something that can be asked; units of sampling what must hold first."""
+
+CRASHED = "crashed"
+"""Reason of a request at which something broke, next to `ig2mj.planning.REASONS`."""
+
+
+def home_of(primitive: str, number: int, seed: int) -> str:
+    """The home in which a request is drawn."""
+    homes = shipped_homes()
+    return homes[int(_stream(primitive, number, seed).integers(len(homes)))]
+
+
+def _stream(primitive: str, number: int, seed: int, part: int = 0) -> np.random.Generator:
+    return np.random.default_rng([seed, MEASURED.index(primitive), number, part])
+
+
+@entry_point
+def measure(home: str, rung: str, robot: str, seed: int, requests: Sequence[Sequence[Any]], seconds: float) -> bytes:
+    """Results of requests in one home, as a JSON list; a job of `ig2mj.cluster`.
+
+    Args:
+      rung: one of `RUNGS`. requests: (primitive, number). seconds: wall time of one.
+    """
+    with jax.default_device(jax.local_devices(backend="cpu")[0]):
+        bench = _bench(home, rung, robot, seed)
+        return json.dumps([_measured(bench, primitive, number, seconds) for primitive, number in requests]).encode()
+
+
+def _measured(bench: RequestBench, primitive: str, number: int, seconds: float) -> dict[str, Any]:
+    row: dict[str, Any] = {"primitive": primitive, "number": number, "home": bench.home, "arguments": []}
+    row |= {"prepared": False, "solution": False, "reason": "", "detail": "", "attempts": 0}
+    row |= {"time": 0.0, "planning": 0.0, "processor": 0.0}
+    try:
+        with _time_limit(seconds):
+            return {**row, **bench.run(primitive, number)}
+    except TimeoutError:
+        return {
+            **row,
+            "prepared": True,
+            "solution": True,
+            "reason": "timeout",
+            "detail": f"{seconds:.0f} s of wall time",
+        }
+    except Exception as e:  # one request must not end the run
+        detail = f"{type(e).__name__}: {e}"
+        return {**row, "prepared": True, "solution": True, "reason": CRASHED, "detail": detail}
+
+
+@functools.lru_cache(maxsize=1)
+def _bench(home: str, rung: str, robot: str, seed: int) -> RequestBench:
+    return RequestBench(home, rung, robot, seed)
+
+
+class RequestBench:
+    """A home with the objects of `KIT` and a robot, in which requests are carried out one after another.
+
+    Attributes:
+      home: its name.
+    """
+
+    def __init__(self, home: str, rung: str, robot: str = "humanoid", seed: int = 0):
+        """
+        Raises:
+          UnknownNameError: no such home or robot. PlanningError: the robot's motion cannot be planned.
+        """
+        if rung not in RUNGS:
+            raise PlanningError(f"requests cannot be measured on the {rung} rung ({', '.join(RUNGS)} can)")
+        self.home, self._seed = home, seed
+        bare = load_scene(home, objects=KIT)
+        self._sampler = make_sampler(bare)
+        self._own_start = self._sampler.start
+        body: Any = make_robot(robot)
+        self._domain = Domain(self._sampler.model, body.hand_count)
+        own = set(load_scene(home).object_names)
+        wholes = np.flatnonzero(bare.tables.object_part_of < 0)
+        kit = [name for o in wholes if (name := bare.tables.object_names[o]) not in own]
+        self._source = RequestSource(self._domain, kit)
+        self._simulation = None
+        if rung == "physics":
+            x, y = start_place(bare, self._sampler.query.view, ())
+            scene = load_scene(home, agents=[body.at(x, y, 0.0)], objects=KIT)
+            self._simulation = Simulation(scene, seed=seed, grasping="assisted")
+            self._query = SceneQuery(scene)
+
+    def run(self, primitive: str, number: int) -> dict[str, Any]:
+        """Draws a request and carries it out; see the module's text."""
+        rng = _stream(primitive, number, self._seed, 1)
+        drawn = (self._source.draw(primitive, rng) for _ in range(DRAWS))
+        request = next((r for r in drawn if r is not None), None)
+        if request is None:
+            return {"detail": "the home has nothing that it could be asked of"}
+        found: dict[str, Any] = {"arguments": list(request.step.arguments)}
+        row, why = self._start(request, rng)
+        if row is None:
+            return {**found, "detail": why}
+        solution = self._carried_out(self._symbolic(row, number), request)
+        rung = self._symbolic(row, number) if self._simulation is None else self._physics(row, request.step, number)
+        for name in request.taken:
+            taken = _outcome(rung, Step("grasp", (name,)))
+            if not taken.done:
+                return {**found, "detail": f"grasp {name}: {taken.reason}: {taken.detail}"}
+        began = time.process_time()
+        outcome = _outcome(rung, request.step)
+        return {
+            **found,
+            "prepared": True,
+            "solution": solution.done or outcome.done,
+            "reason": outcome.reason,
+            "detail": outcome.detail,
+            "attempts": outcome.attempts,
+            "time": round(outcome.time, 2),
+            "planning": round(outcome.planning, 4),
+            "processor": round(time.process_time() - began, 3),
+        }
+
+    def _start(self, request: Request, rng: np.random.Generator) -> tuple[Row | None, str]:
+        """A state in which everything holds that must hold first, or why there is none."""
+        sampler = self._sampler
+        physics, states = self._own_start
+        sampler.query.load(physics)
+        sampler.start_from(physics, states)
+        facts = Facts(self._domain, states, sampler.query.view)
+        placed = {c.arguments[0] for c in request.before if c.is_placement}
+        shut = [c for n in request.taken if n not in placed for c in facts.containers(n) if self._domain.opens(c)]
+        said = {c.arguments[0] for c in request.before if c.predicate == "open"}
+        before = [*request.before, *(Condition("open", (c,)) for c in dict.fromkeys(shut) if c not in said)]
+        if not before:
+            return Row(physics, states), ""
+        rejected: Counter[str] = Counter()
+        try:
+            row = sampler.sample(before, rng, Budget(WORK), rejected, keep=True)
+        except (StateError, AbilityError) as e:
+            return None, str(e)
+        return row, ", ".join(f"{reason} ({count})" for reason, count in rejected.most_common(2))
+
+    def _symbolic(self, row: Row, number: int) -> SymbolicRung:
+        return SymbolicRung(self._domain, self._sampler, [(row.physics, row.states)], self._seed, number)
+
+    def _physics(self, row: Row, step: Step, number: int) -> PhysicsRung:
+        simulation = self._simulation
+        assert simulation is not None
+        simulation.reset()
+        put_row(simulation, row)
+        write = open_doors(simulation.scene, step.arguments)
+        if write is not None:
+            simulation._write(write)
+            engine = simulation.engine
+            simulation.step(count=round(DOORS_SETTLE / (engine.substeps * engine.timestep)))
+        return PhysicsRung(simulation.agent.rung.stage, self._seed, number, self._query)
+
+    def _carried_out(self, rung: Rung, request: Request) -> Outcome:
+        """The outcome on a rung; of a grasp that comes before it, if that fails."""
+        for step in [*(Step("grasp", (name,)) for name in request.taken), request.step]:
+            outcome = _outcome(rung, step)
+            if not outcome.done:
+                return outcome
+        return Outcome()
+
+
+def _outcome(rung: Rung, step: Step) -> Outcome:
+    rung.begin(0, step)
+    return rung.advance()[0]
+
+
+@contextlib.contextmanager
+def _time_limit(seconds: float) -> Iterator[None]:
+    """Raises TimeoutError in this thread after so much wall time, where the system has such a timer."""
+    if not hasattr(signal, "SIGALRM") or not np.isfinite(seconds):
+        yield
+        return
+
+    def end(*_: object) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
