@@ -4,8 +4,9 @@ The file is compiled, and the robot is written from the compiled model: MuJoCo i
 folders. What is not the robot's is left out: floors, lights, free objects, targets. What is kept:
 
 - Bodies, with those that are fixed to each other made one; joints; masses; visual and collision geoms with their
-  friction. Meshes are written as OBJ without textures, in the colours of their materials.
-- Equalities between joints, and `connect` between bodies: linkages of grippers stay closed.
+  friction. Meshes are written as OBJ, in the colours of their materials and with images that their coordinates place.
+- Equalities: of joints, of tendons that are sums of joints, connections and welds between bodies. Linkages of grippers
+  stay closed.
 - Limits of actuators, as limits of motors. Joints without an actuator are passive where the file has actuators.
   Several joints on the tendon of one actuator become one that leads and others that follow.
 - Sites and cameras, as links that a layout can name; the keyframe "home", else the first, as positions at the start.
@@ -20,6 +21,7 @@ import json
 import os
 import pathlib
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -38,37 +40,45 @@ from .bodies.robot_description import FORMAT_VERSION as ROBOT_VERSION
 from .bodies.robot_description import ROBOT_FILE
 from .hulls.convex import reduce_vertices, solid_hull
 from .mjcf.model_builder import ModelBuilder, write_model
+from .mjcf.robot_looks import colour_of, image_of, textured_mesh
+from .mjcf.robot_ties import add_ties
+from .reading.mjcf_grippers import Mounting, assembled
 
 LEAST_MASS, LEAST_INERTIA = 1e-3, 1e-7
 """kg and kg m2 of a link that moves and weighs nothing, which MuJoCo refuses."""
-
-GREY = (0.5, 0.5, 0.5, 1.0)
-"""Colour that MuJoCo gives a geom which has none."""
 
 THINNEST = 1e-3
 """m: flat collision meshes are thickened to this."""
 
 
 def convert_mjcf_robot(
-    file: str | os.PathLike, out: str | os.PathLike, *, name: str | None = None, options: ConvertOptions | None = None
+    file: str | os.PathLike,
+    out: str | os.PathLike,
+    *,
+    name: str | None = None,
+    options: ConvertOptions | None = None,
+    grippers: Sequence[Mounting] = (),
 ) -> ConversionOutcome:
     """Converts a robot's MJCF.
 
     Args:
       file: of the robot, or a scene that includes it. out: folder for the result, replaced when everything went well.
-      name: of the robot, default the model's.
+      name: of the robot, default the model's. grippers: other files that are mounted on it.
 
     Raises:
       InputError: MuJoCo cannot load the file, it names files outside of its folder, or there is no robot in it.
+      UnknownNameError: there is nothing of that name to mount a gripper on.
     """
     path, start = pathlib.Path(file), time.perf_counter()
     options = options or ConvertOptions()
     options.progress(0, 2, f"reading {path.name}")
     if not path.is_file():
         raise InputError(path, "is not a file", element="--mjcf", fix="name a robot's MJCF")
-    root = read_mjcf(path)
+    roots = [] if options.mesh_root is None else [pathlib.Path(options.mesh_root)]
+    root = read_mjcf(path, roots)
     try:
-        robot = MjcfRobot(mujoco.MjModel.from_xml_path(str(path)), path)
+        model = assembled(path, grippers, roots) if grippers else mujoco.MjModel.from_xml_path(str(path))
+        robot = MjcfRobot(model, path)
     except (ValueError, OSError, mujoco.FatalError) as e:
         raise InputError(path, f"MuJoCo cannot load it: {without_lines(e)}", fix="name a file that MuJoCo opens") from e
     title = root.get("model", "")
@@ -131,13 +141,7 @@ def _write(robot: MjcfRobot, name: str, folder: pathlib.Path, options: ConvertOp
         _set_inertia(robot, link, body)
         _add_geoms(robot, link, body, builder, options)
     bodies[robot.base].pos = [0.0, 0.0, max(-_lowest(builder, bodies[robot.base]), 0.0)]
-    for follower in robot.followers:
-        one, two = (f"{name}_{robot.joint_name(j)}" for j in (follower.joint, follower.leader))
-        equality = builder.spec.add_equality(
-            type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=one, name2=two
-        )
-        equality.data[:5] = follower.coefficients
-    _add_connects(robot, name, bodies, builder.spec)
+    add_ties(robot, name, bodies, builder.spec)
     write_model(builder.spec, folder / "object.xml", exact=True)
 
 
@@ -184,7 +188,7 @@ def _add_geoms(
     model, counts = robot.model, {"collision": 0, "visual": 0}
     own = [g for g in range(model.ngeom) if model.geom_bodyid[g] in link.parts and not is_endless(model, g)]
     colliding = [g for g in own if model.geom_contype[g] or model.geom_conaffinity[g]]
-    drawn = [g for g in own if g not in colliding and model.geom_group[g] <= 2 and _colour(model, g)[3] > 0]
+    drawn = [g for g in own if g not in colliding and model.geom_group[g] <= 2 and colour_of(model, g)[3] > 0]
     for kind, geoms in (("collision", colliding), ("visual", drawn or colliding)):
         for geom in geoms:
             of_class = builder.collision_class if kind == "collision" else builder.visual_class
@@ -192,8 +196,9 @@ def _add_geoms(
             quat = np.zeros(4)
             mujoco.mju_mat2Quat(quat, pose[:3, :3].ravel())
             shape: dict[str, Any] = {"type": mujoco.mjtGeom(int(model.geom_type[geom])), "size": model.geom_size[geom]}
+            image = None if kind == "collision" else image_of(robot, geom)
             if model.geom_dataid[geom] >= 0 and shape["type"] == mujoco.mjtGeom.mjGEOM_MESH:
-                mesh = _mesh(robot, geom, f"{body.name}_{kind}", builder, kind == "collision", options)
+                mesh = _mesh(robot, geom, f"{body.name}_{kind}", builder, kind, image is not None, options)
                 if mesh is None:
                     continue
                 shape = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": mesh}
@@ -201,65 +206,30 @@ def _add_geoms(
                 of_class, name=f"{body.name}/{kind}_{counts[kind]}", pos=pose[:3, 3], quat=quat, mass=0.0, **shape
             )
             counts[kind] += 1
-            added.rgba = _colour(model, geom)
+            added.rgba = colour_of(model, geom)
+            if image is not None and (material := builder.textures.material(image)) is not None:
+                added.material = material
             if kind == "collision":
                 added.friction, added.condim = model.geom_friction[geom], int(model.geom_condim[geom])
                 added.solref, added.solimp = model.geom_solref[geom], model.geom_solimp[geom]
 
 
-def _colour(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    material = int(model.geom_matid[geom])
-    own = np.array(model.geom_rgba[geom])
-    return np.array(model.mat_rgba[material]) if material >= 0 and np.allclose(own, GREY) else own
-
-
 def _mesh(
-    robot: MjcfRobot, geom: int, label: str, builder: ModelBuilder, collides: bool, options: ConvertOptions
+    robot: MjcfRobot, geom: int, label: str, builder: ModelBuilder, kind: str, textured: bool, options: ConvertOptions
 ) -> str | None:
     """The asset of a geom's mesh; of one that collides its convex hull. None: it is flat."""
     model, mesh = robot.model, int(robot.model.geom_dataid[geom])
     first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     vertices = np.array(model.mesh_vert[first : first + count], float)
-    if collides:
+    if kind == "collision":
         hull, problem = solid_hull(vertices, THINNEST)
         if hull is None:
             robot.warnings.append(f"mesh '{model.mesh(mesh).name}' {problem}: it does not collide")
             return None
         hull = reduce_vertices(hull, options.max_hull_vertices)
         return builder.meshes.add(hull.vertices, hull.faces, label)
+    if textured:
+        vertices, faces, coordinates = textured_mesh(model, mesh)
+        return builder.meshes.add(vertices, faces, label, uv=coordinates, surface=True)
     begin, number = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     return builder.meshes.add(vertices, np.array(model.mesh_face[begin : begin + number]), label, surface=True)
-
-
-def _add_connects(robot: MjcfRobot, name: str, bodies: dict[str, mujoco.MjsBody], spec: mujoco.MjSpec) -> None:
-    """`connect` constraints between parts of the robot, by sites."""
-    model = robot.model
-    for eq in np.flatnonzero(model.eq_active0 > 0):
-        kind = mujoco.mjtEq(int(model.eq_type[eq]))
-        if kind == mujoco.mjtEq.mjEQ_JOINT:
-            continue
-        sites = _ends(robot, int(eq)) if kind == mujoco.mjtEq.mjEQ_CONNECT else None
-        if sites is None:
-            robot.warnings.append(f"equality {eq} ({kind.name[5:].lower()}) is left out")
-            continue
-        names = []
-        for number, (link, pos) in enumerate(sites):
-            names.append(f"{name}_connect_{eq}_{number}")
-            bodies[link].add_site(name=names[-1], pos=pos, size=[1e-3] * 3, rgba=[0.0] * 4)
-        added = spec.add_equality(type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, name1=names[0], name2=names[1])
-        added.solref, added.solimp = model.eq_solref[eq], model.eq_solimp[eq]
-
-
-def _ends(robot: MjcfRobot, eq: int) -> list[tuple[str, np.ndarray]] | None:
-    """The two points of a `connect`: the links that move them, and where they are in their frames."""
-    model, found = robot.model, []
-    for number, target in enumerate((int(model.eq_obj1id[eq]), int(model.eq_obj2id[eq]))):
-        pos = np.array(model.eq_data[eq, 3 * number : 3 * number + 3])
-        body = target
-        if mujoco.mjtObj(int(model.eq_objtype[eq])) == mujoco.mjtObj.mjOBJ_SITE:
-            body, pos = int(model.site_bodyid[target]), np.array(model.site_pos[target])
-        place = robot.place(body)
-        if place is None:
-            return None
-        found.append((place[0], place[1][:3, :3] @ pos + place[1][:3, 3]))
-    return found

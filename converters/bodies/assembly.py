@@ -24,6 +24,8 @@ MIN_GYRATION_RADIUS = 1e-3
 #: No body's largest moment of inertia exceeds the sum of the other two. Flat and slender bodies lie near that bound,
 #: and MJCF's six digits must not round them across it: the distance kept, relative to the largest.
 MOMENT_MARGIN = 1e-5
+#: MuJoCo refuses meshes with fewer vertices.
+LEAST_CORNERS = 4
 
 
 @dataclasses.dataclass
@@ -206,7 +208,12 @@ class _Planner:
                 drawable = []
             if any(shape.kind == "mesh" for shape in drawable):
                 drawable = [shape for shape in drawable if shape.kind == "mesh"]
-        return [part for shape in drawable for part in _visual_parts(shape, at)]
+        parts = [part for shape in drawable for part in _visual_parts(shape, at)]
+        kept = [part for part in parts if part.kind != "mesh" or _corners(part) >= LEAST_CORNERS]
+        if few := len(parts) - len(kept):
+            what = "a visual mesh has" if few == 1 else f"{few} visual meshes have"
+            self.warnings.append(f"link '{link}': {what} fewer than {LEAST_CORNERS} vertices and is left out")
+        return kept
 
     def _ensure_movable(self, body: BodyPlan) -> None:
         inertial = body.inertial
@@ -287,6 +294,13 @@ def _moved(piece: HullPiece, at: np.ndarray) -> HullPiece:
         return piece
     pose = piece.pose if piece.kind == "hull" else at @ piece.pose
     return dataclasses.replace(piece, pose=pose, vertices=apply(at, piece.vertices))
+
+
+def _corners(part: VisualPart) -> int:
+    """Vertices of a mesh at different places; of a mesh with enough of them those among its first."""
+    assert part.vertices is not None
+    first = len(np.unique(np.round(part.vertices[:100], 7), axis=0))
+    return first if first >= LEAST_CORNERS else len(np.unique(np.round(part.vertices, 7), axis=0))
 
 
 def _is_drawable(shape: Shape) -> bool:

@@ -60,7 +60,8 @@ class MjcfRobot:
     Attributes:
       model: compiled. links: by name, parents first. base: name of the first.
       omnidirectional: its file moves the base by slides and a hinge. floats: by a free joint.
-      followers: joints that follow others. warnings: what is left out, one line each.
+      followers: joints that follow others. tendons_as_joints: equalities of tendons that are among those.
+      warnings: what is left out, one line each.
     """
 
     def __init__(self, model: mujoco.MjModel, file: pathlib.Path):
@@ -69,6 +70,7 @@ class MjcfRobot:
         self.omnidirectional = self.floats = False
         self.links: dict[str, MovingLink] = {}
         self.warnings: list[str] = []
+        self.tendons_as_joints: set[int] = set()
         self._mover: dict[int, str] = {}
         self._find()
         self.base = next(iter(self.links))
@@ -226,12 +228,7 @@ class MjcfRobot:
         if kind in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
             return {target: float(model.actuator_gear[actuator, 0]) or 1.0}
         if kind == mujoco.mjtTrn.mjTRN_TENDON:
-            wraps = model.tendon_adr[target] + np.arange(model.tendon_num[target])
-            return {
-                int(model.wrap_objid[w]): float(model.wrap_prm[w])
-                for w in wraps
-                if mujoco.mjtWrap(int(model.wrap_type[w])) == mujoco.mjtWrap.mjWRAP_JOINT
-            }
+            return self._joints_of_tendon(target) or {}
         return {}
 
     def _actuated(self) -> dict[int, float]:
@@ -258,11 +255,16 @@ class MjcfRobot:
     def _followers(self) -> list[Follower]:
         """By equalities, and by tendons that pull several joints with one motor."""
         model, known, found = self.model, self.joints, []
-        for eq in np.flatnonzero((model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (model.eq_active0 > 0)):
+        for eq in np.flatnonzero(model.eq_active0 > 0):
+            kind, coefficients = mujoco.mjtEq(int(model.eq_type[eq])), tuple(float(c) for c in model.eq_data[eq, :5])
             one, two = int(model.eq_obj1id[eq]), int(model.eq_obj2id[eq])
+            if kind == mujoco.mjtEq.mjEQ_TENDON and (pair := self._as_joints(one, two, coefficients)) is not None:
+                one, two, coefficients = pair
+                self.tendons_as_joints.add(int(eq))
+            elif kind != mujoco.mjtEq.mjEQ_JOINT:
+                continue
             if one not in known or two not in known:
                 continue
-            coefficients = tuple(float(c) for c in model.eq_data[eq, :5])
             straight = coefficients[1] != 0 and not any(coefficients[2:])
             if one in self.actuated and two not in self.actuated and straight:
                 one, two = two, one
@@ -277,6 +279,30 @@ class MjcfRobot:
                     found.append(Follower(joint, leader, (0.0, float(np.sign(coefficient * share)), 0.0, 0.0, 0.0)))
         seen: set[int] = set()
         return [f for f in found if not (f.joint in seen or seen.add(f.joint))]
+
+    def _as_joints(
+        self, one: int, two: int, coefficients: tuple[float, ...]
+    ) -> tuple[int, int, tuple[float, ...]] | None:
+        """An equality of tendons as one between two joints: of a tendon that is a sum of two, and of two tendons of one
+        joint each; None of others."""
+        first, second = self._joints_of_tendon(one), self._joints_of_tendon(two) if two >= 0 else {}
+        if first is None or second is None:
+            return None
+        if len(first) == 2 and not second:
+            (leader, by), (joint, share) = first.items()
+            return joint, leader, (coefficients[0] / share, -by / share, 0.0, 0.0, 0.0)
+        if len(first) == len(second) == 1:
+            (joint, share), (leader, by) = *first.items(), *second.items()
+            return joint, leader, tuple(c * by**k / share for k, c in enumerate(coefficients))
+        return None
+
+    def _joints_of_tendon(self, tendon: int) -> dict[int, float] | None:
+        """Joints whose positions a tendon adds up -> their factors; None: it runs through the air."""
+        model = self.model
+        wraps = model.tendon_adr[tendon] + np.arange(model.tendon_num[tendon])
+        if np.any(model.wrap_type[wraps] != int(mujoco.mjtWrap.mjWRAP_JOINT)):
+            return None
+        return {int(model.wrap_objid[w]): float(model.wrap_prm[w]) for w in wraps}
 
     # ---------------------------------------------------------------------------------------------- what is in links
 

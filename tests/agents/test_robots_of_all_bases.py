@@ -17,6 +17,7 @@ from urdf_parts import converted, joint, link, wheel
 from ig2mj.agents.registry import find_robot, make_robot
 from ig2mj.agents.urdf import Layout, UrdfRobot
 from ig2mj.agents.urdf.summary import summary
+from ig2mj.calibration.robot_hand import hand_of
 from ig2mj.cli import call
 from ig2mj.errors import EngineError, InputError, UnknownNameError
 
@@ -138,6 +139,87 @@ def test_legs_are_refused_unless_the_base_is_bolted_down(tmp_path):
     assert UrdfRobot.load(folder, {"base": "fixed"}).layout.base == "fixed"
 
 
+def test_a_refused_robot_leaves_no_folder(tmp_path, monkeypatch, capsys):
+    """An earlier conversion in the same place stays as it was."""
+    monkeypatch.setattr("ig2mj.viewer.robot_picture.robot_picture", lambda *_, **__: _Picture())
+    file, layout, out = write_rover(tmp_path), tmp_path / "mine.toml", tmp_path / "rover"
+    layout.write_text('arm = ["shouldr_pan"]\n')
+    convert = ["convert", "robot", "--urdf", str(file), "--out", str(out), "--no-report"]
+    assert call([*convert, "--layout", str(layout)]) == 2
+    assert "near matches: shoulder_pan" in capsys.readouterr().err and not out.exists()
+    assert call(convert) == 0
+    assert "2 warnings" in capsys.readouterr().out
+    before = sorted(str(path.relative_to(out)) for path in out.rglob("*"))
+    assert call([*convert, "--layout", str(layout)]) == 2
+    assert sorted(str(path.relative_to(out)) for path in out.rglob("*")) == before
+
+
+def test_wheels_that_are_steered_are_refused(tmp_path):
+    parts = []
+    turn = '<limit lower="-0.5" upper="0.5" effort="20" velocity="5"/>'
+    for side, y in (("left", 0.12), ("right", -0.12)):
+        parts += [
+            link(f"{side}_hinge"),
+            joint(f"{side}_hinge", "revolute", "base", f"{side}_hinge", "0.1 0 0", "0 0 1", turn),
+        ]
+        parts += [part.replace("base", f"{side}_hinge") for part in wheel(f"front_{side}", f"0 {y} -0.06")]
+        parts += wheel(f"rear_{side}", f"-0.1 {y} -0.06")
+    folder = converted(tmp_path, *parts, name="car")
+    with pytest.raises(InputError, match=r"robot 'car' steers like a car \(left_hinge, right_hinge\): Ackermann"):
+        UrdfRobot.load(folder)
+    assert UrdfRobot.load(folder, {"base": "fixed"}).layout.base == "fixed"
+
+
+def test_a_joint_that_carries_a_whole_gripper_is_of_the_arm(tmp_path):
+    """As in pybullet's r2d2: "gripper_extension" slides the hand, and two joints named as a gripper's hang on it."""
+    parts = [
+        link("pole", "0.02 0.02 0.1"), link("one", "0.01 0.02 0.1", 0.05), link("two", "0.01 0.02 0.1", 0.05),
+        joint("gripper_extension", "prismatic", "base", "pole", "0 0 0.2", "1 0 0"),
+        joint("left_gripper_joint", "prismatic", "pole", "one", "0.06 0.01 0", "0 1 0"),
+        joint("right_gripper_joint", "prismatic", "pole", "two", "0.06 -0.01 0", "0 -1 0"),
+    ]  # fmt: skip
+    layout = UrdfRobot.load(converted(tmp_path, *parts)).layout
+    assert layout.arm == ("gripper_extension",) and layout.hand == "pole"
+    assert layout.gripper == ("left_gripper_joint", "right_gripper_joint")
+
+
+def test_fingers_hold_with_their_tips(tmp_path):
+    """Blocks at the roots of the fingers, which nearly meet, count neither for the rays nor for the opening."""
+    finger = (
+        '<link name="{name}"><inertial><mass value="0.05"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4"/></inertial>'
+        '<collision><geometry><box size="0.01 0.01 0.1"/></geometry></collision>'
+        '<collision><origin xyz="0 {y} -0.045"/><geometry><box size="0.01 0.04 0.01"/></geometry></collision></link>'
+    )
+    parts = [
+        link("hand", "0.06 0.1 0.02"), finger.format(name="one", y=-0.02), finger.format(name="two", y=0.02),
+        joint("lift", "prismatic", "base", "hand", "0 0 0.4", "0 0 1"),
+        joint("left_finger", "prismatic", "hand", "one", "0 0.05 0.06", "0 1 0"),
+        joint("right_finger", "prismatic", "hand", "two", "0 -0.05 0.06", "0 -1 0"),
+    ]  # fmt: skip
+    robot = UrdfRobot.load(converted(tmp_path, *parts))
+    hand = hand_of(robot)
+    np.testing.assert_allclose(hand.point, (0, 0, 0.085), atol=1e-6)
+    np.testing.assert_allclose(np.abs(hand.across), (0, 1, 0), atol=1e-6)
+    assert hand.opening == pytest.approx(0.09 + 2 * 0.04, abs=1e-6)
+
+
+def test_linkages_are_closed_wherever_their_motor_is(tmp_path):
+    """A parallelogram: the passive link turns by as much as the driven one."""
+    bar = '<joint name="{name}" axis="0 1 0" range="-2 2"/><geom type="capsule" fromto="0 0 0 0 0 0.1" size="0.01"/>'
+    text = f"""<mujoco model="bars"><compiler angle="radian"/><worldbody><body name="foot">
+    <geom type="box" size="0.1 0.1 0.05" mass="4"/>
+    <body name="a" pos="0 0 0.1">{bar.format(name="driven")}
+      <body name="c" pos="0 0 0.1"><joint name="coupler" axis="0 1 0" range="-2 2"/>
+        <geom type="capsule" fromto="0 0 0 0.05 0 0" size="0.01"/></body></body>
+    <body name="b" pos="0.05 0 0.1">{bar.format(name="passive")}</body>
+    </body></worldbody><equality><connect body1="c" body2="b" anchor="0.05 0 0"/></equality>
+    <actuator><position joint="driven" kp="10"/></actuator></mujoco>"""
+    robot = UrdfRobot.load(mjcf(tmp_path, text))
+    data = robot.body.posed({"driven": 0.4})
+    at = {name: float(data.joint(f"bars_{name}").qpos[0]) for name in ("driven", "passive", "coupler")}
+    assert at == pytest.approx({"driven": 0.4, "passive": 0.4, "coupler": -0.4}, abs=1e-3)
+
+
 def test_a_gripper_of_one_finger_closes_against_its_hand(tmp_path):
     jaw = '<limit lower="0" upper="1.2" effort="5" velocity="2"/>'
     parts = [
@@ -199,7 +281,7 @@ def test_mjcf_gives_its_joints_limits_start_frames_and_followers(arm):
     np.testing.assert_allclose(description.frames["wrist_cam"].axes, np.eye(3), atol=1e-9)
     assert "toy" not in description.frames
     (rays,) = robot.hand_rays()
-    np.testing.assert_allclose(rays.grasp_point, (0.37, 0, 0), atol=1e-6)
+    np.testing.assert_allclose(rays.grasp_point, (0.385, 0, 0), atol=1e-6)  # the middle of the fingertips
     assert ("gripper", "left (closed at its lower limit)") in summary(robot)
 
 
@@ -280,7 +362,7 @@ def test_the_command_line_says_what_it_assigned_and_keeps_an_edited_layout(tmp_p
     assert call(convert) == 0
     said = capsys.readouterr().out
     assert "differential drive (base_link)" in said and "shoulder_pan, lift, wrist -> hand" in said
-    assert "hand: holds at 0.060 0.000 0.000 m" in said and "edit it to change" in said
+    assert "hand: holds at 0.080 0.000 0.000 m" in said and "edit it to change" in said
     (out / "layout.toml").write_text('base = "fixed"\n')
     assert call(convert) == 0
     said = capsys.readouterr().out

@@ -6,6 +6,7 @@ import errno
 import json
 import pathlib
 
+import mujoco
 import numpy as np
 import pytest
 import shapely
@@ -248,3 +249,16 @@ def test_models_whose_mesh_files_are_gone_are_skipped_as_missing_file_by_file(da
     assert call([*args, "--out", str(tmp_path / "out"), "--skip-missing"]) == 3
     (line,) = [s for s in json.loads(capsys.readouterr().out)["skipped"] if s.startswith("stove_0")]
     assert collision[0].name in line
+
+
+def test_a_visual_mesh_of_fewer_than_four_vertices_is_left_out(tmp_path):
+    """MuJoCo refuses such meshes; the object is converted without it, with a warning that names the link."""
+    (tmp_path / "sliver.obj").write_text("v 0 0 0\nv 0.1 0 0\nv 0.1 0.2 0\nv 0 0 0\nf 1 2 3\nf 4 2 3\n")
+    mesh = '<visual><geometry><mesh filename="sliver.obj"/></geometry></visual>'
+    box = "<geometry><box size='0.1 0.1 0.1'/></geometry>"
+    text = f'<robot name="r"><link name="l">{mesh}<visual>{box}</visual><collision>{box}</collision></link></robot>'
+    (tmp_path / "r.urdf").write_text(text)
+    outcome = convert_object(tmp_path / "r.urdf", "toy", tmp_path / "out", options=ConvertOptions(report=False))
+    assert "r: link 'l': a visual mesh has fewer than 4 vertices and is left out" in outcome.first_warnings
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "object.xml"))
+    assert model.ngeom == 2 and model.nmesh == 0

@@ -120,6 +120,7 @@ def convert_robot(
     out: pathlib.Path,
     urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     mjcf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    gripper: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FILE[@NAME]")] = (),
     name: str | None = None,
     layout: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     mesh_root: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None,
@@ -136,12 +137,16 @@ def convert_robot(
       out: output folder; an earlier result there is replaced once the conversion succeeds, except its layout.toml.
       urdf: the robot's URDF.
       mjcf: the robot's MJCF, e.g. of MuJoCo Menagerie, or a scene that includes it.
+      gripper: MJCF of a gripper to mount on an arm of MJCF, and the name of the site or body of the arm that carries
+        it; default: its site attachment_site, else its last body. Of several arms one for each.
       name: name of the robot; default: the one in the file.
       layout: TOML or JSON file that corrects the assignment (docs/guide/robots.md).
-      mesh_root: additional folder from which meshes may be read (URDFs that use ../ or absolute paths).
+      mesh_root: additional folder from which meshes may be read (files that use ../ or absolute paths).
       package_path: folders that hold the packages of `package://` names.
     """
+    from ig2mj_converters.base.output import replaced_folder
     from ig2mj_converters.convert_robot import convert_robot as convert
+    from ig2mj_converters.reading.mjcf_grippers import Mounting
 
     from ig2mj.agents.urdf.robot import own_layout
     from ig2mj.cli.common.robot_report import tell_robot, write_layout
@@ -159,9 +164,15 @@ def convert_robot(
     kept = own_layout(out)
     former = None if kept is None or layout is not None else (kept.name, kept.read_bytes())
     options = options_of(common, default_jobs=os.cpu_count() or 1, mesh_root=mesh_root, package_path=package_path)
-    with _progress(f"converting {file.name}") as options_with:
-        outcome = convert(file, out, name=name, options=options_with(options))
-    said = write_layout(out, layout, former)
+    mountings = [Mounting.of_words(words) for words in gripper]
+    with replaced_folder(out) as folder:
+        made = folder / ".converted"
+        with _progress(f"converting {file.name}") as options_with:
+            outcome = convert(file, made, name=name, options=options_with(options), grippers=mountings)
+        said = write_layout(made, layout, former, out)
+        for entry in made.iterdir():
+            entry.rename(folder / entry.name)
+        made.rmdir()
     status = _tell(outcome, out, "object.xml", common.json)
     if not common.json:
         tell_robot(out, said)
@@ -212,7 +223,7 @@ def _progress(title: str) -> Iterator[Any]:
 
 def _tell(outcome: ConversionOutcome, out: pathlib.Path, main_file: str, as_json: bool) -> int:
     """Prints what was written and where; the exit status."""
-    from ig2mj.cli.common.printing import print_json
+    from ig2mj.cli.common.printing import counted, print_json
 
     failed = [check for check in outcome.checks if not check.passed]
     if as_json:
@@ -230,8 +241,8 @@ def _tell(outcome: ConversionOutcome, out: pathlib.Path, main_file: str, as_json
     else:
         seconds = sum(outcome.timings.values())
         from_cache = " (nothing has changed: taken from the cache)" if outcome.cached else ""
-        what = "1 object" if outcome.objects == 1 else f"{outcome.objects} objects"
-        print(f"{out / main_file}: {what}, {outcome.warnings} warnings, {seconds:.1f} s{from_cache}")
+        what = counted(outcome.objects, "object")
+        print(f"{out / main_file}: {what}, {counted(outcome.warnings, 'warning')}, {seconds:.1f} s{from_cache}")
         for line in outcome.skipped:
             print(f"  skipped, not in the dataset: {line}")
         for check in failed:
@@ -240,7 +251,7 @@ def _tell(outcome: ConversionOutcome, out: pathlib.Path, main_file: str, as_json
             print(f"  warning: {line}")
         if outcome.warnings > len(outcome.first_warnings):
             where = f"; {out / 'report.html'} has all" if outcome.checks else ""
-            print(f"  ... {outcome.warnings} warnings in all{where}")
+            print(f"  ... {counted(outcome.warnings, 'warning')} in all{where}")
         if outcome.checks:
             print(f"  report: {out / 'report.html'}")
     return SKIPPED if outcome.skipped else 0

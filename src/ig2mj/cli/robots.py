@@ -52,6 +52,7 @@ def try_(
       seed: random seed of the cube's positions.
       json: print one JSON object.
     """
+    import collections
     import dataclasses
 
     from ig2mj.agents.grasping import MODES
@@ -76,7 +77,14 @@ def try_(
         print(f"  drives {result.drives:.2f} m")
     if result.lifted:
         times = f"{sum(result.lifted)} of {len(result.lifted)}"
-        print(f"  lifts a cube of {1000 * result.cube:.0f} mm in {times} tries, {result.approach}, {result.mode}")
+        print(
+            f"  lifts a cube of {1000 * result.cube:.0f} mm in {times} tries ({result.needed} are needed),"
+            f" {result.approach}, {result.mode}"
+        )
+        for reason, count in collections.Counter(filter(None, result.reasons)).items():
+            print(f"    {count} of {len(result.lifted)}: {reason}")
+        if not result.passed and grasping == "physical" and sum(result.lifted) < result.needed:
+            print("    --grasping assisted: the hand holds what its fingers touch on both sides")
     if result.problem:
         print(f"  {result.problem}")
     return 0 if result.passed else 1

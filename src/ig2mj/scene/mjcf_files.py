@@ -14,6 +14,7 @@ from __future__ import annotations
 import pathlib
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from typing import Any
 
 from ig2mj.errors import InputError
@@ -35,20 +36,23 @@ _PLAIN = re.compile(r"[\w.-]+", re.ASCII)
 _FIX = "convert the scene again"
 
 
-def read_mjcf(file: pathlib.Path) -> ElementTree.Element:
+def read_mjcf(file: pathlib.Path, roots: Sequence[pathlib.Path] = ()) -> ElementTree.Element:
     """The root element of a file whose paths, and those of the files that it includes, lie where they may.
+
+    Args:
+      roots: further folders in which meshes and textures may lie.
 
     Raises:
       InputError: it is missing or no MJCF, or one that is not read (see the module's text), or it asks for more than a
         limit (`mjcf_limits`). OutsideError: it names a path outside.
     """
-    found = _read_all(file)[file]
+    found = _read_all(file, [root.resolve() for root in roots])[file]
     check_mjcf(file)
     return found
 
 
-def _read_all(file: pathlib.Path) -> dict[pathlib.Path, ElementTree.Element]:
-    """All files that belong to a scene, by path, the scene's own first."""
+def _read_all(file: pathlib.Path, more: Sequence[pathlib.Path]) -> dict[pathlib.Path, ElementTree.Element]:
+    """All files that belong to a scene, by path, the scene's own first. more: see `read_mjcf`."""
     root = file.parent.resolve()
     found, waiting = {file: _parse(file)}, [file]
     while waiting:
@@ -67,13 +71,13 @@ def _read_all(file: pathlib.Path) -> dict[pathlib.Path, ElementTree.Element]:
             if _SHARED.fullmatch(value):
                 shared.append((file.parent / value).resolve())
             elif value:
-                inside(value, file.parent, place, "compiler", [root])
+                inside(value, file.parent, place, "compiler", [root, *more])
             folders.add(value or ".")
     bases = {base / folder for base in {file.parent, *(p.parent for p in found)} for folder in folders}
     names = {name: place for place, tree in found.items() for name in _named_files(tree)}
     if len(names) * len(bases) > MOST_PATHS:
         raise InputError(file, f"names {len(names)} files in {len(bases)} folders", fix="name fewer")
-    roots = [root, *shared]
+    roots = [root, *shared, *more]
     for name, place in names.items():
         for base in bases:
             if not _is_plain(name) or (base / name).is_symlink():

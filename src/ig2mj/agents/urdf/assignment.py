@@ -5,7 +5,7 @@
 - The base is differential with one wheel on either side, skid-steer with more. It is omnidirectional where wheels point
   in different directions, where all of them swivel, or where names say so.
 - Grippers are joints named as fingers or jaws, and where an arm has none of those, the short branches at its end.
-- Legs are refused: nothing here walks.
+- Legs are refused: nothing here walks. So are wheels that are steered like a car's.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ RIGHT = frozenset(("right", "r", "fr", "rr", "br", "mr", "rf", "rb", "rm"))
 FINGERS = ("finger", "jaw", "thumb", "knuckle", "claw", "pincer", "driver")
 GRIPS = ("gripper", *FINGERS)
 PASSIVE = ("caster", "castor", "swivel")
+STEERING = ("steer",)
 OMNI = ("mecanum", "omni", "swedish", "holonomic")
 SUCTION = ("suction", "vacuum")
 CAMERAS = ("camera", "realsense", "kinect", "xtion", "eyes", "cam_", "_cam", "head_tilt", "head")
@@ -47,6 +48,9 @@ LEGS = frozenset(("hip", "thigh", "calf", "knee", "ankle", "shank", "foot", "leg
 """Words of joints of legs."""
 
 FEWEST_LEGS = 2
+
+FEWEST_FINGERS = 2
+"""Joints named as a gripper's on one link, so that the joint that moves this link carries the gripper."""
 
 LEVEL = 0.3
 """Largest share of a wheel's axis that points upwards, and of a swivel's that does not."""
@@ -73,8 +77,8 @@ def find_layout(
       body: of this robot. given: what is not to be found but taken, as in a file. where: what errors name.
 
     Raises:
-      InputError: an entry is of the wrong kind, the robot cannot be driven so, or it has legs. UnknownNameError: the
-        robot has no such joint or link.
+      InputError: an entry is of the wrong kind, the robot cannot be driven so, it has legs, or it steers like a car.
+      UnknownNameError: the robot has no such joint or link.
     """
     given = dict(given or {})
     check_entries(robot, given, where)
@@ -85,8 +89,11 @@ def find_layout(
         even = len(wheels) > 0 and len(wheels) % 2 == 0
         found_base = FIXED if not even else DIFFERENTIAL if len(wheels) == 2 else SKID_STEER
     base = given.get("base", found_base)
-    if base == FIXED and "base" not in given and "wheels" not in given:
-        _refuse_legs(robot, where)
+    if "base" not in given and "wheels" not in given:
+        if base == FIXED:
+            _refuse_legs(robot, where)
+        if base != OMNIDIRECTIONAL:
+            _refuse_steering(robot, body, where)
     _check_wheels(base, wheels, where)
     wheels = wheels if base != FIXED else ()
     carrying = body.joints_to({robot.joint(name).child for name in wheels})
@@ -161,14 +168,19 @@ def _rolls(joint: RobotJoint, body: RobotBody) -> bool:
 
 def _swivels(robot: Description, body: RobotBody, wheel: RobotJoint) -> bool:
     """Something between it and the base turns about a vertical axis."""
+    return _swivel(robot, body, wheel) is not None
+
+
+def _swivel(robot: Description, body: RobotBody, wheel: RobotJoint) -> RobotJoint | None:
+    """The joint between a wheel and the base that turns about a vertical axis."""
     above = {joint.child: joint for joint in robot.joints}
     link = wheel.parent
     while link in above:
         joint = above[link]
         if joint.type in ("revolute", "continuous") and abs(body.axis(joint.name)[2]) > 1 - LEVEL:
-            return True
+            return joint
         link = joint.parent
-    return False
+    return None
 
 
 def _sides(wheels: Sequence[RobotJoint], body: RobotBody) -> tuple[list[RobotJoint], list[RobotJoint]]:
@@ -178,6 +190,27 @@ def _sides(wheels: Sequence[RobotJoint], body: RobotBody) -> tuple[list[RobotJoi
         return left, right
     at = {joint.name: body.hub(joint.name)[1] for joint in wheels}
     return [j for j in wheels if at[j.name] > 0], [j for j in wheels if at[j.name] < 0]
+
+
+def _refuse_steering(robot: Description, body: RobotBody, where: str) -> None:
+    """Raises InputError: some of its wheels are steered, by joints with limits and motors."""
+    wheels = [joint for joint in robot.joints if joint.mimics is None and _rolls(joint, body)]
+    swivels = [_swivel(robot, body, wheel) for wheel in wheels]
+    steering = [j.name for j in swivels if j is not None and _steers(j, body)]
+    if steering:
+        raise InputError(
+            where,
+            f"robot '{robot.name}' steers like a car ({', '.join(steering)}): Ackermann steering is not supported",
+            element="base",
+            fix='base = "fixed" bolts it to the floor, in a layout',
+        )
+
+
+def _steers(joint: RobotJoint, body: RobotBody) -> bool:
+    """It has a motor and two ends, or is named so; casters do not."""
+    if joint.passive or _named(joint.name, PASSIVE):
+        return False
+    return _named(joint.name, STEERING) or bool(np.isfinite(body.limits(joint.name)).all())
 
 
 def _refuse_legs(robot: Description, where: str) -> None:
@@ -198,8 +231,8 @@ def _refuse_legs(robot: Description, where: str) -> None:
 
 
 def _is_leg(joint: RobotJoint) -> bool:
-    """A joint such as `LF_HAA`, `FL_thigh_joint`, `j_left_knee`."""
-    return bool((_words(joint.name) | _words(joint.child)) & LEGS)
+    """A joint such as `LF_HAA`, `FL_thigh_joint`, `j_left_knee`, and not of a gripper that hangs on a foot."""
+    return not _named(joint.name, GRIPS) and bool((_words(joint.name) | _words(joint.child)) & LEGS)
 
 
 def _named(name: str, parts: Sequence[str]) -> bool:
@@ -215,7 +248,8 @@ def _grips(robot: Description, joint: RobotJoint) -> bool:
     """It opens and closes a gripper, and does not turn without end. A joint that is not named so, and carries one that
     is, turns the whole gripper."""
     if joint.type == "continuous" or not _named(joint.child, FINGERS):  # a wrist may turn a whole "gripper_link"
-        return joint.type != "continuous" and _named(joint.name, GRIPS)
+        carried = [j for j in robot.joints if j.parent == joint.child and j.mimics is None and _named(j.name, GRIPS)]
+        return joint.type != "continuous" and _named(joint.name, GRIPS) and len(carried) < FEWEST_FINGERS
     if _named(joint.name, GRIPS):
         return True
     return not any(other.parent == joint.child and _named(other.name, GRIPS) for other in robot.joints)
@@ -252,7 +286,11 @@ def _gripping(robot: Description, free: Sequence[RobotJoint]) -> list[RobotJoint
             continue
         found += [j for branch in moving for j in inside(branch) if j in free and j not in found]
     for link in hands:  # other fingers of a hand, whatever they are called
-        fingers = [j for j in below.get(link, []) if j.type != "continuous" and longest(j) <= SHORT_BRANCH]
+        fingers = [
+            j
+            for j in below.get(link, [])
+            if j.type != "continuous" and longest(j) <= SHORT_BRANCH and not hands & {k.child for k in inside(j)}
+        ]
         found += [j for finger in fingers for j in inside(finger) if j in free and j not in found]
     return [joint for joint in free if joint in found]
 

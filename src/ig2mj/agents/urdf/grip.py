@@ -21,7 +21,10 @@ from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.layout import Gripper, Layout
 
 INSIDE = 0.8
-"""Share of a finger's half size at which rays begin and end."""
+"""Share of a fingertip's half size at which rays begin and end."""
+
+FINGERTIP = 0.5
+"""Share of a finger's length, from its end, by which it holds."""
 
 NEARER = 1e-3
 """m by which fingers are nearer to each other at one limit of a joint, so that it counts as the closed one."""
@@ -123,8 +126,9 @@ def gripper_rays(name: str, body: RobotBody, gripper: Gripper) -> HandRays | Non
         one, opposite = _opposed(body, tips, data)
         middles = {tip: _to_base(body, tip, body.box(tip)[0][None], data)[0] for tip in tips}
         towards = np.mean([middles[other] for other in opposite], axis=0)
-        starts = _face(body, one, towards - middles[one], data)
-        others = [(other, _face(body, other, middles[one] - middles[other], data)) for other in opposite]
+        palm = body.pose(hand, data)[0]
+        starts = _face(body, one, towards - middles[one], palm, data)
+        others = [(other, _face(body, other, middles[one] - middles[other], palm, data)) for other in opposite]
     ends = np.concatenate([points for _, points in others])
     inner = [_to_base(body, one, starts, data).mean(0), np.mean([_to_base(body, *o, data).mean(0) for o in others], 0)]
     palm_pos, palm_turn = body.pose(hand, data)
@@ -147,10 +151,19 @@ def _opposed(body: RobotBody, tips: list[str], data: mujoco.MjData) -> tuple[str
     return one, others[:OPPOSITE]
 
 
-def _face(body: RobotBody, link: str, inward: np.ndarray, data: mujoco.MjData) -> np.ndarray:
-    """Four points [4, 3] on the side of a finger's box that faces `inward` (base's frame), in the finger's frame."""
-    centre, half = body.box(link)
-    local = body.pose(link, data)[1].T @ inward
+def _face(body: RobotBody, link: str, inward: np.ndarray, palm: np.ndarray, data: mujoco.MjData) -> np.ndarray:
+    """Four points [4, 3] on the side of a fingertip's box that faces `inward`, in the finger's frame.
+
+    inward: in the base's frame. palm: where the hand is, in the base's frame, m.
+    """
+    pos, turn = body.pose(link, data)
+    local, points = turn.T @ inward, body.edge_points(link)
+    outward = points.mean(0) - turn.T @ (palm - pos)
+    along = local / max(float(np.linalg.norm(local)), 1e-9)
+    outward = outward - along * (outward @ along)
+    reach = points @ (outward / max(float(np.linalg.norm(outward)), 1e-9))
+    tip = points[reach >= reach.max() - FINGERTIP * np.ptp(reach)]
+    centre, half = (tip.min(0) + tip.max(0)) / 2, np.ptp(tip, axis=0) / 2
     across = int(np.argmax(np.abs(local)))
     sides = [k for k in range(3) if k != across]
     spots = []

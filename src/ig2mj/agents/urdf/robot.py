@@ -37,6 +37,7 @@ from ig2mj.agents.parts import (
     visual,
 )
 from ig2mj.agents.task_robot import TaskRobot
+from ig2mj.agents.urdf.adding import add_robot
 from ig2mj.agents.urdf.assignment import find_layout, raised
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.controller import UrdfController
@@ -171,7 +172,7 @@ class UrdfRobot(TaskRobot):
         standing, mount = self.body.standing(self.layout), 0.0 if self.drives else self.layout.mount or 0.0
         pos[2] += standing + mount
         quat, layout = normalized(self.quat if quat is None else quat), self.layout
-        bodies = self.body.add_to(spec, self.name, pos, quat, fixed=not self.drives, layout=layout)
+        bodies = add_robot(self.body, spec, self.name, pos, quat, fixed=not self.drives, layout=layout)
         fingers = self.finger_links
         for link, body in bodies.items():
             body.gravcomp = 0.0 if link == self.description.base or link in self._rolling else 1.0

@@ -59,6 +59,11 @@ def least_width(columns: Sequence[str], rows: Rows) -> int:
     return sum(widest) + GAP * (len(widest) - 1)
 
 
+def counted(number: int, what: str) -> str:
+    """E.g. "1 warning", "2 warnings"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def print_json(data: Any) -> None:
     """Indented JSON on stdout; also of msgspec structures. NaN and infinities become null."""
     import msgspec

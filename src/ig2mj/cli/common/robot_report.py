@@ -13,12 +13,14 @@ HEAD = """\
 """
 
 
-def write_layout(folder: pathlib.Path, given: pathlib.Path | None, former: tuple[str, bytes] | None) -> str:
+def write_layout(
+    folder: pathlib.Path, given: pathlib.Path | None, former: tuple[str, bytes] | None, shown: pathlib.Path
+) -> str:
     """Puts the layout into a folder that was just converted: the file given, else the one that was there before, else
     what is found.
 
     Args:
-      former: name and content of the layout of an earlier conversion.
+      former: name and content of the layout of an earlier conversion. shown: what the folder is called afterwards.
 
     Returns:
       One line about it. Raises InputError or UnknownNameError: it does not fit the robot, or the robot has legs.
@@ -30,15 +32,15 @@ def write_layout(folder: pathlib.Path, given: pathlib.Path | None, former: tuple
         UrdfRobot.load(folder, given)  # errors name the user's file
         place = folder / LAYOUT_FILES[1 if given.suffix.lower() == ".json" else 0]
         shutil.copyfile(given, place)
-        return f"layout: {place}, as {given} says"
+        return f"layout: {shown / place.name}, as {given} says"
     if former is not None:
         place = folder / former[0]
         place.write_bytes(former[1])
         UrdfRobot.load(folder)
-        return f"layout: {place}, kept from the earlier conversion"
+        return f"layout: {shown / place.name}, kept from the earlier conversion"
     place = folder / LAYOUT_FILES[0]
     place.write_text(HEAD + UrdfRobot.load(folder, {}).layout.as_toml(), encoding="utf-8")
-    return f"layout: {place}, found; edit it to change what is below"
+    return f"layout: {shown / place.name}, found; edit it to change what is below"
 
 
 def tell_robot(folder: pathlib.Path, said: str = "", picture: pathlib.Path | None = None) -> None:
