@@ -89,6 +89,7 @@ GUESTS = {
         "ig2mj.knowledge",
         "ig2mj.scene.manifest",
         "ig2mj.scene.mjcf_files",
+        "ig2mj.scene.mjcf_text",
         "ig2mj.errors",
         "ig2mj.install_hint",
         "ig2mj.files",
