@@ -178,7 +178,7 @@ class _Clauses:
             rest.append(w)
         what = " ".join(rest[:4])
         where = f" as {expected}" if expected else ""
-        return NotUnderstoodError(f"'{what}' is not understood{where}{self.lexicon.near(word, verbs)}")
+        return NotUnderstoodError(f"'{what}' is not understood{where}{self.lexicon.near(rest[:4], verbs)}")
 
     def _objects(
         self, expected: str = "an object", single: bool = False, mentioned: Sequence[Phrase] | None = None

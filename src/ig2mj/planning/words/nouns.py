@@ -45,7 +45,7 @@ USUAL = {"table": ("breakfast table", "coffee table"), "chair": ("straight chair
 
 IRREGULAR = {"knives": "knife", "shelves": "shelf", "loaves": "loaf", "dishes": "dish", "people": "person"}
 
-NUMBERS = {w: n for n, w in enumerate("one two three four five six seven eight nine ten".split(), 1)}
+NUMBERS = dict(one=1, two=2, three=3, four=4, five=5, six=6, seven=7, eight=8, nine=9, ten=10)
 
 PRONOUNS = ("it", "them", "they", "this", "that", "these", "those")
 
@@ -110,13 +110,14 @@ class Lexicon:
         usable = ~np.asarray(tables.object_parked)
         pairs = zip(tables.object_names, tables.object_categories, usable, strict=True)
         self._category = {n: c.replace("_", " ") for n, c, free in pairs if free and c not in IGNORED}
+        self._named = {spoken: n for n in self._category for spoken in (n, n.replace("_", " "))}
+        self._known: dict[str, tuple[str, ...]] = {}
 
     def noun(self, words: Sequence[str]) -> tuple[tuple[str, ...], bool] | None:
         """Objects that words name, and whether the words are a plural; None: none."""
         text = " ".join(words)
-        for name in self._category:
-            if text in (name, name.replace("_", " ")):
-                return (name,), False
+        if text in self._named:
+            return (self._named[text],), False
         if found := self._called(text):
             return found, False
         for single in singular(words[-1]):
@@ -126,6 +127,11 @@ class Lexicon:
 
     def _called(self, text: str) -> tuple[str, ...]:
         """Objects of the category, of one that ends with these words, or of what they are another word for."""
+        if text not in self._known:
+            self._known[text] = self._look_up(text)
+        return self._known[text]
+
+    def _look_up(self, text: str) -> tuple[str, ...]:
         exact = tuple(n for n, c in self._category.items() if c == text)
         ends = exact or tuple(n for n, c in self._category.items() if c.endswith(" " + text))
         if ends:
@@ -148,10 +154,11 @@ class Lexicon:
         """All objects that can be carried."""
         return tuple(n for n in self._category if not self.facts.domain.fixed(n))
 
-    def near(self, word: str, others: Iterable[str] = ()) -> str:
-        """Words that are written nearly like one, for a message."""
+    def near(self, words: Sequence[str], others: Iterable[str] = ()) -> str:
+        """Words that are written nearly like the first of some that has such, for a message."""
         known = {w for c in self._category.values() for w in (c, c.rsplit(" ", 1)[-1])} | {*self.rooms, *others}
-        found = difflib.get_close_matches(word, sorted(known), n=2, cutoff=0.7)
+        each = (difflib.get_close_matches(w, sorted(known), n=2, cutoff=0.7) for w in words if len(w) > 3)
+        found = next((f for f in each if f), [])
         return f" (did you mean {' or '.join(found)}?)" if found else ""
 
 
@@ -257,15 +264,15 @@ class Reader:
         return None, certain
 
     def _room_before_noun(self) -> str:
-        """"kitchen" of "kitchen cabinet", "dining" of "dining table"."""
+        """ "kitchen" of "kitchen cabinet", "dining" of "dining table"."""
         for room, name in self.lexicon.rooms.items():
             for spoken in (room, room.split()[0]):
                 length = len(spoken.split())
                 rest = self.words[self.at + length : self.at + length + 3]
-                if self.sees(spoken) and any(self.lexicon.noun(rest[:k]) for k in range(len(rest), 0, -1)):
-                    if not self.lexicon.noun(self.words[self.at : self.at + length + 1]):
-                        self.at += length
-                        return name
+                named = any(self.lexicon.noun(rest[:k]) for k in range(len(rest), 0, -1))
+                if self.sees(spoken) and named and not self.lexicon.noun(self.words[self.at : self.at + length + 1]):
+                    self.at += length
+                    return name
         return ""
 
     def _modified(self, phrase: Phrase, required: bool = False) -> Phrase:

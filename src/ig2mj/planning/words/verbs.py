@@ -80,8 +80,10 @@ FROM = ("out of", "off of", "away from", "from inside", "off", "from", "out")
 """Prepositions of where something is taken from."""
 
 FILLERS = frozenset(
-    "please kindly then first next finally now also afterwards just again back carefully gently quickly away down up "
-    "for me together too".split()
+    [
+        *("please", "kindly", "then", "first", "next", "finally", "now", "also", "afterwards", "just", "again", "back"),
+        *("carefully", "gently", "quickly", "away", "down", "up", "for", "me", "together", "too"),
+    ]
 )
 """Words that change nothing where they stand between the parts of a clause."""
 
