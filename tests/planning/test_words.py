@@ -7,6 +7,7 @@ import tomllib
 import pytest
 
 import ig2mj
+from ig2mj import cli
 from ig2mj.errors import InputError, UnknownNameError
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.steps import PRIMITIVES, PlanningError
@@ -123,3 +124,14 @@ def test_a_faulty_script_is_refused(tmp_path, text, error, said):
     (tmp_path / "script.json").write_text(text)
     with pytest.raises(error, match=said):
         read_script(tmp_path / "script.json")
+
+
+@pytest.mark.slow
+def test_a_script_is_carried_out_until_a_request_fails(tmp_path, capsys):
+    steps = [("grasp", {"object": "apple_0"}), ("grasp", {"object": "sofa_0"}), ("release", {"object": "apple_0"})]
+    script = tmp_path / "script.json"
+    script.write_text(json.dumps([{"name": name, "arguments": arguments} for name, arguments in steps]))
+    assert cli.call(["solve", "small_home", "--script", str(script), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert found["failures"] == {"grasp": {"no_grasp": 1}}
+    assert found["q"] == pytest.approx(1 / 3)

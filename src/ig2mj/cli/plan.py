@@ -38,7 +38,8 @@ def run(
 
     Args:
       what: an activity (`ig2mj activity list`), or the name or folder of a home.
-      goal: an expression, such as "(inside apple_0 fridge_0)"; an activity has its own.
+      goal: an expression, such as "(inside apple_0 fridge_0)", or plain words, such as "put the apple into the
+        fridge and close it"; an activity has its own.
       robot: which robot is to act: it has as many free hands.
       split: start states of the activity: train or held_out.
       row: number of the start state.
@@ -67,7 +68,7 @@ def run(
 
         raise Ig2mjError("name an activity (ig2mj activity list), or a home and a goal; or measure with --benchmark")
     from ig2mj.cli.common.objects import note_changes
-    from ig2mj.cli.common.planning import check_row, domain_of
+    from ig2mj.cli.common.planning import check_row, domain_of, expression_of
     from ig2mj.cli.common.printing import make_table, print_json, stdout_console
     from ig2mj.planning.pddl import write_pddl
     from ig2mj.planning.problem import problem_of
@@ -75,6 +76,7 @@ def run(
     from ig2mj.planning.task_planner import TaskPlanner
 
     check_row(row)
+    goal = expression_of(what, goal, object, robot)
     problem = problem_of(what, goal, object)
     note_changes(problem.scene, object)
     domain = domain_of(problem, robot)

@@ -31,6 +31,7 @@ def run(
     seed: int = 0,
     seconds: float = float("inf"),
     object: AddedObjects = (),
+    script: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     record: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
@@ -42,7 +43,8 @@ def run(
 
     Args:
       what: an activity (`ig2mj activity list`), or the name or folder of a home.
-      goal: an expression, such as "(inside apple_0 fridge_0)"; an activity has its own.
+      goal: an expression, such as "(inside apple_0 fridge_0)", or plain words, such as "put the apple into the
+        fridge and close it"; an activity has its own.
       robot: which robot acts.
       episodes: number of start states, each solved once.
       worlds: number of episodes that are solved side by side, in physics.
@@ -52,6 +54,9 @@ def run(
       seed: of what is sampled; the same seed gives the same result.
       seconds: wall time of an episode after which it ends.
       object: with a home: {object}.
+      script: with a home, in place of a goal: a JSON array of requests, such as
+        [{"name": "grasp", "arguments": {"object": "apple_0"}}], which the robot carries out in order, in physics, until
+        one fails.
       out: file of results, one line of JSON for each episode; episodes that it holds already are not repeated.
       record: HDF5 file to record the episodes to, in physics; successful ones are demonstrations (`ig2mj demos`).
       video: video of the episodes (.mp4, .gif, .webp), or five of its images (.png, .jpg), in physics; of the first
@@ -64,7 +69,7 @@ def run(
 
     from ig2mj.cli.common.files import check_output, check_video
     from ig2mj.cli.common.objects import note_changes
-    from ig2mj.cli.common.planning import domain_of
+    from ig2mj.cli.common.planning import domain_of, expression_of
     from ig2mj.cli.common.solving import StepTable, print_figures, print_result
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.install_hint import require_module
@@ -74,6 +79,12 @@ def run(
     from ig2mj.planning.task_planner import TaskPlanner
     from ig2mj.tasks.pools import SEEDS
 
+    if script is not None:
+        if goal is not None or record or video or out or rung == "symbolic" or max(episodes, worlds) > 1:
+            raise Ig2mjError("--script takes a home, --robot, --seed, --object and --json alone")
+        from ig2mj.cli.common.scripts import run_script
+
+        return run_script(what, script, robot, seed, object, json)
     if episodes < 1:
         raise Ig2mjError(f"--episodes {episodes}: at least one is needed")
     if not seconds > 0:
@@ -92,6 +103,7 @@ def run(
     if record is not None:
         require_module("h5py")
     began = time.monotonic()
+    goal = expression_of(what, goal, object, robot)
     problem = problem_of(what, goal, object)
     note_changes(problem.scene, object)
     domain = domain_of(problem, robot)

@@ -38,7 +38,9 @@ def expression_of(what: str, goal: str | None, objects: Sequence[str], robot: st
         print(note, file=sys.stderr)
     if instruction.goal is None:
         steps = ", ".join(map(str, instruction.steps))
-        raise PlanningError(f"'{goal}' asks for {steps}, of which something has no effect that lasts: no goal to plan for")
+        raise PlanningError(
+            f"'{goal}' asks for {steps}, of which something has no effect that lasts: no goal to plan for"
+        )
     return instruction.goal
 
 
