@@ -17,7 +17,7 @@ _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0], np.float32)
 
 def length(v: Float[np.ndarray, "*b d"]) -> Float[np.ndarray, "*b"]:
     """Euclidean length."""
-    return np.sqrt(np.sum(np.square(v), axis=-1))
+    return np.asarray(np.sqrt(np.sum(np.square(v), axis=-1)))
 
 
 def cross(a: Vec, b: Vec) -> Float[np.ndarray, "*b 3"]:
@@ -71,7 +71,7 @@ def quat_to_rotation_vector(q: Quat) -> Float[np.ndarray, "*b 3"]:
 def rotation_angle(a: Quat, b: Quat) -> Float[np.ndarray, "*b"]:
     """Angle between two orientations, in [0, pi]."""
     relative = quat_multiply(quat_conjugate(a), b)
-    return 2 * np.arctan2(length(relative[..., 1:]), np.abs(relative[..., 0]))
+    return np.asarray(2 * np.arctan2(length(relative[..., 1:]), np.abs(relative[..., 0])))
 
 
 def matrix_to_quat(m: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "4"]:

@@ -1,4 +1,4 @@
-"""`MotionPlanner`: ways of a robot's base over the floor of a home.
+"""`MotionPlanner`: ways of a robot's base over the floor of a home, and of its hands.
 
     planner = MotionPlanner(simulation.scene)
     plan = planner.plan_base(simulation.view, (1.0, -2.0))
@@ -19,9 +19,16 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import PhysicsView
+from ig2mj.geometry.host_rotations import quat_rotate
+from ig2mj.install_hint import pip_install_extra
+from ig2mj.planning.bodies import HoveringBody, body_of, grip_of, sense
 from ig2mj.planning.clearance import Obstacles, PlacedPieces
 from ig2mj.planning.footprint import BaseFootprint
+from ig2mj.planning.hand_collision import HandCollision
+from ig2mj.planning.hand_way import HandWay
 from ig2mj.planning.occupancy import RESOLUTION, Occupancy, door_objects
+from ig2mj.planning.rrt_connect import is_installed
+from ig2mj.planning.steps import PlanningError
 from ig2mj.scene.scene import Scene
 from ig2mj.tasks.navigation.floor import FloorMap
 
@@ -36,6 +43,9 @@ COMFORT, CAUTION = 0.15, 3.0
 
 FLOORS_KEPT = 8
 """Free floors that are kept with their fields."""
+
+HAND_CHECKS = 4000
+"""States of a hand that RRT-Connect looks at before it gives up."""
 
 LOOKAHEAD = 120
 """Cells of a way that one straight line may replace."""
@@ -57,6 +67,26 @@ class BasePlan:
     reason: str = ""
     detail: str = ""
     doors: tuple[str, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class HandPlan:
+    """A way of a hand, or why there is none.
+
+    Attributes:
+      points: [N, 3] m, world frame, of the hand's grasp point; the first is where it is.
+      quats: [N, 4] w-x-y-z, world frame, of the palm at each point; it turns evenly in between.
+      length: m. reason: "" for a way, "no_base": the goal is out of the hand's reach from where the base stands,
+        "no_grasp": the hand does not fit there, "no_path": no way leads there.
+      detail: the reason in words. method: "straight", "via" or "rrt_connect".
+    """
+
+    points: Float[np.ndarray, "N 3"]
+    quats: Float[np.ndarray, "N 4"]
+    length: float = 0.0
+    reason: str = ""
+    detail: str = ""
+    method: str = ""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -245,6 +275,90 @@ class MotionPlanner:
             return self._blocked(view, here, goal, footprint, without, world)
         length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
         return BasePlan(way, yaw, length)
+
+    @functools.cached_property
+    def _body(self) -> HoveringBody:
+        """How the robot moves its hands."""
+        robot = self.scene.agents[self.agent]
+        name = self.scene.tables.agent_names[self.agent]
+        body = body_of(self.scene, robot.controller(self.scene.tables, self.agent), self.agent)
+        if not len(body.hands):
+            raise PlanningError(f"robot '{name}' has no hands")
+        if not isinstance(body, HoveringBody):
+            raise PlanningError(
+                f"the hands of robot '{name}' are on arms, for which no motion is planned (take the humanoid, whose "
+                "hands float)"
+            )
+        return body
+
+    def plan_hand(
+        self,
+        view: PhysicsView,
+        goal: Sequence[float] | np.ndarray,
+        *,
+        hand: int = 0,
+        quat: Sequence[float] | np.ndarray | None = None,
+        without: Collection[int] = (),
+        world: int = 0,
+        checks: int = HAND_CHECKS,
+        seed: int = 1,
+    ) -> HandPlan:
+        """A way of a hand that floats, and of what it holds, clear of everything else; the base stays where it is.
+
+        The straight line is tried first, then ways over via points, then RRT-Connect (`pip install "ig2mj[plan]"`).
+        Collisions are MuJoCo's. What the hand is near to at the start or at the goal does not count within 5 cm of it.
+
+        Args:
+          view: with a world axis; `world` of it is planned in. goal: x, y and z of the grasp point, m, world frame.
+          hand: of the robot's hands. quat: orientation of the palm at the goal, w-x-y-z, world frame; None: as it is.
+          without: numbers of objects that do not count, such as what the hand is about to take hold of.
+          checks, seed: of RRT-Connect: states that are looked at before it gives up, and its random numbers.
+
+        Returns:
+          The way; `HandPlan.reason` says why there is none.
+
+        Raises:
+          PlanningError: the robot has no such hand, or it is on an arm.
+        """
+        body = self._body
+        if not 0 <= hand < len(body.hands):
+            name = self.scene.tables.agent_names[self.agent]
+            raise PlanningError(f"robot '{name}' has hands 0 to {len(body.hands) - 1}, not {hand}")
+        senses = sense(view, self.agent, body.hands)
+        start = grip_of(senses, hand, body.grips[hand])[world].astype(float)
+        turn = senses.hand_quat[world, hand].astype(float)
+        end = np.asarray(goal, float)
+        last = turn if quat is None else np.asarray(quat, float) / np.linalg.norm(np.asarray(quat, float))
+        here = HandPlan(start[None], turn[None])
+        said = f"({end[0]:.2f}, {end[1]:.2f}, {end[2]:.2f}) m"
+        shoulder = quat_rotate(senses.base_quat[world], body.shoulders[hand]) + senses.base_pos[world]
+        if np.linalg.norm(end - shoulder) > body.reach:
+            return dataclasses.replace(here, reason="no_base", detail=f"{said} is out of the hand's reach")
+        collision = HandCollision(self.scene, view, int(body.hands[hand]), body.grips[hand], without, world)
+        way = HandWay(collision, start, turn, end, last)
+        if blocking := way.blocking:
+            names = ", ".join(sorted({self._name_of_geom(g) for g in blocking}))
+            return dataclasses.replace(here, reason="no_grasp", detail=f"the hand does not fit at {said}: {names}")
+        found, method = way.find(checks, seed)
+        if found is None:
+            hint = "" if is_installed() else f" (RRT-Connect might find one: {pip_install_extra('plan')})"
+            return dataclasses.replace(here, reason="no_path", detail=f"the hand has no way to {said}{hint}")
+        points, quats = found[:, :3], way.turned(found[:, 3])
+        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        return HandPlan(points, quats, length, method=method)
+
+    def _name_of_geom(self, geom: int) -> str:
+        tables = self.scene.tables
+        owner = int(tables.geom_object[geom])
+        return tables.object_names[owner] if owner >= 0 else "the robot itself"
+
+    def plan_arm(self, view: PhysicsView, goal: Sequence[float] | np.ndarray, **options: Any) -> HandPlan:
+        """`plan_hand` of a hand that floats; motion of arms is not planned.
+
+        Raises:
+          PlanningError: the hand is on an arm.
+        """
+        return self.plan_hand(view, goal, **options)
 
     def _blocked(
         self,
