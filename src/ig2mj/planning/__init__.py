@@ -6,7 +6,7 @@ after each. docs/design/planning.md describes how they fit together.
 
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
-from ig2mj.planning.motion_planner import BasePlan, MotionPlanner
+from ig2mj.planning.motion_planner import BasePlan, HandPlan, MotionPlanner
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.problem import Problem, problem_of
 from ig2mj.planning.solver import EpisodeResult, StepRecord, solve, summary
@@ -22,6 +22,7 @@ __all__ = [
     "Domain",
     "EpisodeResult",
     "Facts",
+    "HandPlan",
     "MotionPlanner",
     "Outcome",
     "PhysicsRung",
