@@ -279,7 +279,7 @@ class MotionPlanner:
     @functools.cached_property
     def _body(self) -> HoveringBody:
         """How the robot moves its hands."""
-        robot = self.scene.agents[self.agent]
+        robot: Any = self.scene.agents[self.agent]
         name = self.scene.tables.agent_names[self.agent]
         body = body_of(self.scene, robot.controller(self.scene.tables, self.agent), self.agent)
         if not len(body.hands):
