@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -31,10 +31,7 @@ def rrt_connect(
       valid: of a state. low, high: bounds of states. resolution: distance at which connections are checked.
       checks: states that are looked at before it gives up. seed: of OMPL's random numbers, above 0.
     """
-    from ompl import base as _base
-    from ompl import geometric, util
-
-    base: Any = _base  # its types have no items, which states have
+    base, geometric, util = (importlib.import_module(f"ompl.{part}") for part in ("base", "geometric", "util"))
 
     util.noOutputHandler()
     util.RNG.setSeed(seed)
@@ -66,5 +63,5 @@ def rrt_connect(
         return None
     path = setup.getSolutionPath()
     geometric.PathSimplifier(setup.getSpaceInformation()).reduceVertices(path)
-    states: Any = path.getStates()
+    states = path.getStates()
     return np.array([[state[i] for i in range(len(start))] for state in states])
