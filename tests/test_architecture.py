@@ -26,6 +26,7 @@ LAYERS = [
     "cluster",
     "knowledge",
     "scene",
+    "looks",
     "geometry",
     "engine",
     "agents",

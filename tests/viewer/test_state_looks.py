@@ -39,7 +39,7 @@ def test_tints_mix_and_are_taken_back(world):
     tint = np.full(tables.num_objects, -1)
     tint[world.scene.object_index("box")] = [t.predicate.name for t in TINTS].index("burnt")
     tint[world.scene.object_index("stove")] = [t.predicate.name for t in TINTS].index("toggled_on")
-    with Tinter(model, tables).shown(tint):
+    with Tinter(model, tables.geom_object).shown(tint):
         box, stove = model.geom("box/visual_0").id, model.geom("stove/visual_0").id
         assert np.allclose(model.geom_rgba[box, :3], 0.2 * before[box, :3])
         assert np.allclose(model.geom_rgba[stove, :3], np.minimum(1.5 * before[stove, :3], 1.0))

@@ -174,6 +174,7 @@ def _replay(scene, objects, dump, image, video, camera, eye, target, size, secon
 
     from PIL import Image
 
+    from ig2mj.looks import visual_of
     from ig2mj.scene.geom_groups import VISIBLE_GROUPS
     from ig2mj.scene.scene import load_scene
     from ig2mj.viewer.offscreen import render
@@ -196,7 +197,9 @@ def _replay(scene, objects, dump, image, video, camera, eye, target, size, secon
         return
     assert image is not None
     groups = (3,) if collision else VISIBLE_GROUPS
-    pixels = render(replay.scene.model, replay.data, view, width=size[0], height=size[1], groups=groups)
+    visual = visual_of(replay.scene, "plain" if collision else None)
+    data = visual.data(replay.scene.model, replay.data)
+    pixels = render(visual.model, data, view, width=size[0], height=size[1], groups=groups)
     Image.fromarray(pixels).save(image)
     print(f"wrote {image} (step {step + 1} of {len(replay)})", file=sys.stderr)
 
@@ -241,6 +244,7 @@ def _write_image(home, file, camera, eye, target, size, seconds, collision) -> N
     import mujoco
     from PIL import Image
 
+    from ig2mj.looks import visual_of
     from ig2mj.scene.geom_groups import VISIBLE_GROUPS
     from ig2mj.viewer.offscreen import default_backend, render
 
@@ -250,6 +254,8 @@ def _write_image(home, file, camera, eye, target, size, seconds, collision) -> N
     view = _view(home, data, camera, eye, target)
     backend = default_backend()
     groups = (3,) if collision else VISIBLE_GROUPS
-    image = render(home.model, data, view, width=size[0], height=size[1], groups=groups, backend=backend)
+    visual = visual_of(home, "plain" if collision else None)
+    seen = visual.data(home.model, data)
+    image = render(visual.model, seen, view, width=size[0], height=size[1], groups=groups, backend=backend)
     Image.fromarray(image).save(file)
     print(f"wrote {file} ({size[0]} x {size[1]}, rendered with {backend})", file=sys.stderr)

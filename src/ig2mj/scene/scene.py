@@ -40,6 +40,10 @@ from ig2mj.scene.substance_requests import check_substances, read_substances, su
 from ig2mj.scene.tables import SceneTables
 from ig2mj.scene.walls import deepen_walls
 
+PLAIN = "plain"
+LOOKS = ("day", "night", PLAIN)
+"""How scenes are seen: decorated, by day or by night; "plain": as their files have them. Physics is the same."""
+
 
 class OldFormatWarning(UserWarning):
     """A converted scene lacks what a newer format has."""
@@ -76,6 +80,7 @@ class Scene:
       additions: objects that were added when it was loaded; they come last on the O axis.
       changes: objects of the home that were removed or replaced. removed: names of all that went, with what stood on
         them.
+      looks: one of `LOOKS`: what `ig2mj.looks` adds where the scene is shown. `model` and `digest` do not depend on it.
     """
 
     folder: pathlib.Path
@@ -87,6 +92,7 @@ class Scene:
     additions: tuple[Addition, ...] = ()
     changes: tuple[Change, ...] = ()
     removed: tuple[str, ...] = ()
+    looks: str = "day"
 
     @property
     def substances(self) -> tuple[str, ...]:
@@ -222,6 +228,7 @@ def load_scene(
     remove: str | Sequence[str] = (),
     replace: Mapping[str, str | os.PathLike] | None = None,
     substances: str | Sequence[str] = (),
+    looks: str = "day",
 ) -> Scene:
     """Loads a converted scene.
 
@@ -242,15 +249,17 @@ def load_scene(
         has room for it, and is taken out where not.
       substances: names of what can fill containers and cover objects, next to those that the manifest names
         (`ig2mj.knowledge.substances`); "substances:water,salt" in `objects` says the same.
+      looks: how it is shown: "day" or "night", with wallpapers, curtains, lamps, plants and a garden that are visual
+        only, or "plain", as its files have it. Physics, objects and hashes are the same.
 
     Raises:
       InputError: a file is missing or is not valid MJCF. UnknownNameError: there is no such folder and the library has
-        no such object, or the home has none of this name, or there is no such substance.
-        Ig2mjError: an object starts inside of something, or a
-        replacement stands in something, or falls.
+        no such object, the home has none of this name, or there are no such looks or no such substance.
+        Ig2mjError: an object starts inside of something, or a replacement stands in something, or falls.
         ManifestError: a manifest is broken, or does not belong to its MJCF. StateError: no place was found at which the
         predicate holds.
     """
+    check_looks(looks)
     file = model_file(path)
     home = load_manifest(file.parent / MANIFEST_FILE)
     if home.format_version < FORMAT_VERSION:
@@ -273,9 +282,15 @@ def load_scene(
             dataclasses.replace(r, place=poses[n], kind="loose", predicate=None) if r.predicate else r
             for n, r in zip(names, requests, strict=True)
         ]
-    scene = _load(file, home, agents, requests, changes)
+    scene = dataclasses.replace(_load(file, home, agents, requests, changes), looks=looks)
     check_start(scene.model, scene.tables, list(scene.additions))
     return scene
+
+
+def check_looks(looks: str) -> None:
+    """Raises UnknownNameError: there are no such looks."""
+    if looks not in LOOKS:
+        raise UnknownNameError("looks", looks, LOOKS)
 
 
 def scene_with(scene: Scene | str | os.PathLike, objects: Objects = ()) -> Scene:

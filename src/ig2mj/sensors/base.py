@@ -18,7 +18,7 @@ from ig2mj.agents.base import Controller
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process.deprecation import warn_renamed
-from ig2mj.scene.scene import Scene
+from ig2mj.scene.scene import PLAIN, Scene, check_looks
 from ig2mj.sensors.images import Images, Pose, RayPattern
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
@@ -32,6 +32,10 @@ class Space:
     dtype: type
     low: float
     high: float
+
+
+CAMERA_LOOKS = PLAIN
+"""How robots' cameras see homes unless asked otherwise: what the policies that ship were trained with."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,6 +55,8 @@ class SensorOptions:
       rows: of all images the first row that is made and the first below those; the others are as if nothing were
         there. For those who look at no others: on a GPU they cost nothing then. None: all.
       shadows: whether images have them; they cost six times the rest natively, twice on a GPU.
+      looks: how images show the home: one of `ig2mj.scene.scene.LOOKS`. Policies that see images were trained with
+        `CAMERA_LOOKS`.
     """
 
     width: int = 128
@@ -73,6 +79,7 @@ class SensorOptions:
     particles: int = 64
     shadows: bool = False
     rows: tuple[int, int] | None = None
+    looks: str = CAMERA_LOOKS
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> SensorOptions:
@@ -81,9 +88,10 @@ class SensorOptions:
         for name, value in values.items():
             if name not in default:
                 raise UnknownNameError("setting of sensors", name, default)
-            kinds = {"rows": (list, tuple, type(None)), "shadows": bool}.get(name, (int, float))
+            kinds = {"rows": (list, tuple, type(None)), "shadows": bool, "looks": str}.get(name, (int, float))
             if not isinstance(value, kinds) or (isinstance(value, bool) and kinds is not bool):
                 raise EngineError(f"{name} = {value!r}: no value of this setting of sensors")
+        check_looks(values.get("looks", CAMERA_LOOKS))
         rows = values.get("rows")
         return cls(**{**values, "rows": rows if rows is None else tuple(rows)})
 

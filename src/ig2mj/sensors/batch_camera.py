@@ -29,7 +29,9 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.engine.warp.patches import graphs_kept, pins
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
+from ig2mj.looks.visual import visual_owners
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
+from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, check_request
 from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, mergeable, rigid_parts, tables_of
 from ig2mj.sensors.particle_slots import Slots, fill_slots
@@ -73,6 +75,7 @@ class BatchCamera:
         rays: Sequence[RayPattern] = (),
         merge_meshes: bool = True,
         rows: tuple[int, int] | None = None,
+        looks: str = PLAIN,
     ):
         """Compiles the render model.
 
@@ -92,6 +95,7 @@ class BatchCamera:
             every world. Scenes with flexes or height fields are not merged.
           rows: of each image the first that is made and the first below those; the others are as if nothing were
             there, and cost nothing. None: all.
+          looks: how the home is seen: one of `ig2mj.scene.scene.LOOKS`.
 
         Raises:
           EngineError: not the Warp engine, or nothing is to be made. UnknownNameError: no such camera.
@@ -106,7 +110,7 @@ class BatchCamera:
         self._lines = height if pins.obstacles() else self._shown[1] - self._shown[0]
         self._sectors = sectors_of(rays)
         self._patterns = {pattern.name: len(pattern.directions) for pattern in rays}
-        self._host = host = make_render_model(engine.scene, particles, [s.camera for s in self._sectors])
+        self._host = host = make_render_model(engine.scene, particles, [s.camera for s in self._sectors], looks)
         self.cameras = [_camera_id(host, name) for name in cameras]
         if rgb and cameras:
             fit_textures(host, float(2 * np.tan(np.deg2rad(host.cam_fovy[self.cameras].min()) / 2) / height))
@@ -277,7 +281,12 @@ class BatchCamera:
     def _plan(self, host: mujoco.MjModel) -> None:
         """Constants of the model, on the host."""
         slots = self.slots
-        self._owner = np.concatenate([self.model.tables.geom_object, np.full(slots, -1)])
+        known, count = self.engine.scene.model.ngeom, host.ngeom - slots
+        owners = visual_owners(self.engine.scene, host, count)
+        self._owner = np.concatenate([self.model.tables.geom_object, owners, np.full(slots, -1)])
+        start = mujoco.MjData(host)
+        mujoco.mj_forward(host, start)
+        self._added = _f32(start.geom_xpos[known:count]), _f32(start.geom_xmat[known:count]).reshape(-1, 3, 3)
         self._rgba, self._mean = _f32(host.geom_rgba), mean_colours(host, np.arange(host.ngeom))
         self._material = np.array(host.geom_matid, np.int32)
         self._size = np.array(host.geom_size, np.float32)
@@ -307,11 +316,12 @@ class BatchCamera:
         light_quat = data.xquat[:, body]
         light_pos = data.xpos[:, body] + quat_rotate(light_quat, jnp.asarray(pos))
         light_dir = quat_rotate(light_quat, jnp.asarray(direction))
+        added_pos, added_mat = self._added
         spread = jax.vmap(lambda time: self._template.replace(time=time))(jnp.zeros(worlds, jnp.float32))
         return spread.tree_replace(
             {
-                "geom_xpos": jnp.concatenate([data.geom_xpos, slots.pos], axis=1),
-                "geom_xmat": jnp.concatenate([data.geom_xmat, slots.rotation], axis=1),
+                "geom_xpos": jnp.concatenate([data.geom_xpos, *_for_worlds(worlds, added_pos), slots.pos], axis=1),
+                "geom_xmat": jnp.concatenate([data.geom_xmat, *_for_worlds(worlds, added_mat), slots.rotation], axis=1),
                 "cam_xpos": camera_pos,
                 "cam_xmat": quat_to_matrix(camera_quat),
                 "_impl.light_xpos": light_pos,
@@ -324,7 +334,9 @@ class BatchCamera:
         worlds, geoms = self.engine.num_worlds, len(self._mean) - self.slots
         tint = tints_of_geoms(tints(self.model, states), self._owner[:geoms])
         own = physics.fields.geom_rgba
-        rgba = jnp.broadcast_to(jnp.asarray(self._rgba[:geoms] if own is None else own), (worlds, geoms, 4))
+        rgba = jnp.broadcast_to(jnp.asarray(self._rgba[:geoms]), (worlds, geoms, 4))
+        if own is not None:
+            rgba = rgba.at[:, : own.shape[-2]].set(own)
         mean = jnp.asarray(self._mean[:geoms])
         in_tint = jnp.concatenate([tinted(mean[:, :3], tint), jnp.broadcast_to(mean[:, 3:], (*tint.shape, 1))], axis=-1)
         rgba = jnp.where((tint == UNTINTED)[..., None], rgba, in_tint)
@@ -353,6 +365,11 @@ def _camera_id(model: mujoco.MjModel, name: str) -> int:
     if number < 0:
         raise UnknownNameError("camera", name, [model.camera(c).name for c in range(model.ncam)])
     return number
+
+
+def _for_worlds(worlds: int, array: np.ndarray) -> list[Array]:
+    """The array once for each world, as the only member of a list; an empty list where it is empty."""
+    return [jnp.broadcast_to(jnp.asarray(array), (worlds, *array.shape))] if len(array) else []
 
 
 def _unpack(packed: Array) -> Array:

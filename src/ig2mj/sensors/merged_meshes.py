@@ -58,8 +58,8 @@ def rigid_parts(host: mujoco.MjModel, scene: mujoco.MjModel, groups: Sequence[in
     mujoco.mj_forward(host, data)
     seen = np.isin(host.geom_group, list(groups)) & (host.geom_type == MESH) & (alpha(host) > 0)
     by_body: dict[int, list[int]] = {}
-    for geom in np.flatnonzero(seen[: scene.ngeom]):
-        body = int(scene.geom_bodyid[geom])
+    for geom in np.flatnonzero(seen):
+        body = int(scene.geom_bodyid[geom]) if geom < scene.ngeom else 0  # what looks add stands still
         welded = int(scene.body_weldid[body])
         mocap = int(scene.body_mocapid[scene.body_rootid[body]]) >= 0
         by_body.setdefault(welded if welded or not mocap else body, []).append(int(geom))

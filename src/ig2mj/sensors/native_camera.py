@@ -22,7 +22,9 @@ from ig2mj.engine.base import Engine
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.frustum import spheres_in_view
+from ig2mj.looks import visual_of
 from ig2mj.scene.geom_groups import HIDDEN_GROUP, VISIBLE_GROUPS
+from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.gl_canvas import Canvas
 from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, check_request
 from ig2mj.sensors.particle_slots import Slots, fill_slots
@@ -51,6 +53,7 @@ class NativeCamera:
         shadows: bool = False,
         rays: Sequence[RayPattern] = (),
         rows: tuple[int, int] | None = None,
+        looks: str = PLAIN,
     ):
         """See `BatchCamera`. OpenGL is started by the first image; rays need none.
 
@@ -64,12 +67,14 @@ class NativeCamera:
         self.engine, self.model = engine, model
         self.width, self.height, self.slots = width, height, particles
         self._wants, self._shadows, self._patterns = (rgb, depth, segmentation), shadows, tuple(rays)
-        self._drawn = copy.copy(engine.scene.model)  # its colours change with the states
+        self._visual = visual_of(engine.scene, looks)
+        self._drawn = copy.copy(self._visual.model)  # its colours change with the states
+        self._colours = self._drawn.geom_rgba.copy(), self._drawn.mat_rgba.copy()
         self.cameras = {name: _camera_id(self._drawn, name) for name in cameras}
         self._visible = np.isin(np.arange(mujoco.mjNGROUP), list(groups)).astype(np.uint8)
         if self._visible[HIDDEN_GROUP]:
             raise EngineError(f"geom group {HIDDEN_GROUP} is never seen (take the groups 0 to {HIDDEN_GROUP - 1})")
-        self._owner = np.concatenate([engine.tables.geom_object, np.full(particles, NOTHING)]).astype(np.int32)
+        self._owner = np.concatenate([self._visual.owner, np.full(particles, NOTHING)]).astype(np.int32)
         self._plain = mean_colours(self._drawn, np.arange(self._drawn.ngeom))
         self._material, self._group = self._drawn.geom_matid.copy(), self._drawn.geom_group.copy()
         self._canvas: Canvas | None = None
@@ -96,9 +101,8 @@ class NativeCamera:
             tint, slots = jax.tree.map(np.asarray, self._look(states, view))
         for w in range(count) if rendered is None else np.flatnonzero(np.asarray(rendered)).tolist():
             live, data = self.engine.to_mujoco(physics, w)
-            for colours, own in ((self._drawn.geom_rgba, live.geom_rgba), (self._drawn.mat_rgba, live.mat_rgba)):
-                colours[:] = own
-                colours[:, 3] = colours[:, 3] > 0  # glass is opaque, as to the ray caster; OpenGL gives it no depth
+            data = self._visual.data(live, data)
+            self._take_colours(live)
             self._drawn.geom_matid[:] = self._material
             for pattern in self._patterns:
                 pos, quat = eyes[pattern.name]
@@ -134,11 +138,26 @@ class NativeCamera:
         """Tints of objects, and particles."""
         return tints(self.model, states), fill_slots(self.model, states, view, self.slots)
 
+    def _take_colours(self, live: mujoco.MjModel) -> None:
+        """Gives geoms and materials the colours of a world's model; what the looks hide or add keeps theirs."""
+        plain, drawn = self.engine.scene.model, self._drawn
+        for colours, base, own, usual in (
+            (drawn.geom_rgba, self._colours[0], live.geom_rgba, plain.geom_rgba),
+            (drawn.mat_rgba, self._colours[1], live.mat_rgba, plain.mat_rgba),
+        ):
+            colours[:] = base
+            if self._visual.looks == PLAIN:
+                colours[:] = own
+            else:
+                changed = np.flatnonzero((own != usual).any(axis=1))
+                colours[changed] = own[changed]
+            colours[:, 3] = colours[:, 3] > 0  # glass is opaque, as to the ray caster; OpenGL gives it no depth
+
     def _tint(self, tint: Int[np.ndarray, "O"]) -> None:
         """Gives geoms of objects whose state shows their mean colours, tinted, in place of texture and material."""
         if (tint == UNTINTED).all():
             return
-        of_geoms = np.asarray(tints_of_geoms(tint[None], self.engine.tables.geom_object))[0]
+        of_geoms = np.asarray(tints_of_geoms(tint[None], self._visual.owner))[0]
         geoms = np.flatnonzero(of_geoms != UNTINTED)
         self._drawn.geom_rgba[geoms, :3] = np.asarray(tinted(self._plain[geoms, :3], of_geoms[None, geoms]))[0]
         self._drawn.geom_rgba[geoms, 3] = self._plain[geoms, 3] > 0

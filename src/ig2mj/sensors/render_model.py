@@ -13,7 +13,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ig2mj.errors import EngineError
-from ig2mj.scene.scene import Scene
+from ig2mj.looks.visual import decorate
+from ig2mj.scene.scene import PLAIN, Scene
 
 BACKGROUND = (0.86, 0.90, 0.94, 1.0)
 """rgba where nothing is hit."""
@@ -22,8 +23,8 @@ NOWHERE = (0.0, 0.0, -50.0)
 """Metres, world frame: where slots are that show nothing."""
 
 
-def make_render_model(scene: Scene, slots: int, cameras: Sequence[str] = ()) -> mujoco.MjModel:
-    """Compiles the render model; geom ids from `scene.model.ngeom` on are the slots.
+def make_render_model(scene: Scene, slots: int, cameras: Sequence[str] = (), looks: str = PLAIN) -> mujoco.MjModel:
+    """Compiles the render model; behind the scene's geoms come those of its looks (`ig2mj.looks`), then the slots.
 
     Args:
       cameras: names of cameras that are added behind the scene's own, for poses that are given with each image.
@@ -37,6 +38,7 @@ def make_render_model(scene: Scene, slots: int, cameras: Sequence[str] = ()) -> 
             spec.delete(element)
     for joint in list(spec.joints):
         spec.delete(joint)
+    decorate(spec, scene, looks)
     body = spec.worldbody.add_body(name="ig2mj/particles")
     for k in range(slots):
         body.add_geom(
@@ -52,7 +54,7 @@ def make_render_model(scene: Scene, slots: int, cameras: Sequence[str] = ()) -> 
         body.add_camera(name=name)
     model = spec.compile()
     known = scene.model
-    if model.ngeom != known.ngeom + slots or (model.geom_bodyid[: known.ngeom] != known.geom_bodyid).any():
+    if model.ngeom < known.ngeom + slots or (model.geom_bodyid[: known.ngeom] != known.geom_bodyid).any():
         raise EngineError(f"scene '{scene.name}' in {scene.folder} changed since it was loaded (load it again)")
     return model
 

@@ -97,6 +97,7 @@ class SensorSuite:
             "particles": options.particles,
             "shadows": options.shadows,
             "rows": options.rows,
+            "looks": options.looks,
             "rays": [pattern for pattern, _ in self._patterns.values()],
             **{name: name in wanted for name in ("rgb", "depth", "segmentation")},
         }

@@ -15,6 +15,7 @@ from jaxtyping import Float, UInt8
 
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.images import HEIGHT, WIDTH
+from ig2mj.looks import visual_of
 from ig2mj.tasks.navigation.objective import NavigationObjective
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.task import Task
@@ -67,23 +68,25 @@ class EpisodeView:
         Raises:
           MissingDependencyError: nothing can draw here.
         """
-        model, data = self._env.core.engine.to_mujoco(state.batch.world.physics, self._world)
+        visual = visual_of(self._env.scene)
+        world_model, data = self._env.core.engine.to_mujoco(state.batch.world.physics, self._world)
         drawn = self._drawn
         if drawn is None or self._tinter is None:
-            drawn = self._drawn = mujoco.MjData(model)
-            self._tinter = Tinter(model, self._env.scene.tables)
+            drawn = self._drawn = mujoco.MjData(world_model)
+            self._tinter = Tinter(visual.model, visual.owner)
         drawn.qpos[:] = data.qpos if qpos is None else qpos
-        mujoco.mj_forward(model, drawn)
+        mujoco.mj_forward(world_model, drawn)
         if camera is None:
-            camera = self._of_episode(model, drawn, state)
+            camera = self._of_episode(world_model, drawn, state)
         elif callable(camera):
-            camera = camera(model, drawn)
+            camera = camera(world_model, drawn)
         states, view = state.batch.world.states, state.batch.world.view
         found = [*marks(self._states, states, view, self._world), *self._goal_marks(state)]
         width, height = self._size
+        seen = visual.data(world_model, drawn)
         with self._tinter.shown(tint_of_objects(self._states, states, self._world)):
             return render(
-                model, drawn, camera, width=width, height=height, decorate=lambda scene: draw_marks(scene, found)
+                visual.model, seen, camera, width=width, height=height, decorate=lambda scene: draw_marks(scene, found)
             )
 
     def _of_episode(self, model: mujoco.MjModel, drawn: mujoco.MjData, state: EnvState) -> FreeView:

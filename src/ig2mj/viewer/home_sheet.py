@@ -10,9 +10,11 @@ import mujoco
 import numpy as np
 from PIL import Image, ImageDraw
 
+from ig2mj.looks import visual_of
 from ig2mj.scene.scene import Scene
 from ig2mj.viewer.offscreen import render
 from ig2mj.viewer.overview import home_overview
+from ig2mj.viewer.room_views import room_view
 
 TILE = (400, 300)  # pixels
 FURTHER = 1.12
@@ -34,19 +36,20 @@ def from_above(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
 
 
 def rooms_inside(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
-    """One RGB image with a labelled tile per room of the homes, from the room's own camera."""
+    """One RGB image with a labelled tile per room of the homes, from the eye height of a person in it."""
     tiles = []
     for scene in scenes:
         data = scene.start_data()
-        cameras = {scene.model.camera(k).name for k in range(scene.model.ncam)}
-        rooms = [room for room in scene.manifest.rooms.instances if room in cameras]
-        tiles += [_tile(scene, data, room, f"{scene.name}: {room}") for room in rooms]
+        rooms = scene.rooms.names if scene.rooms is not None else ()
+        tiles += [_tile(scene, data, room_view(scene, room), f"{scene.name}: {room}") for room in rooms]
     return _sheet(tiles, columns)
 
 
 def _tile(scene: Scene, data: mujoco.MjData, view, text: str) -> Image.Image:
     width, height = TILE
-    drawn = Image.fromarray(render(scene.model, data, view, width=2 * width, height=2 * height))
+    visual = visual_of(scene)
+    seen = visual.data(scene.model, data)
+    drawn = Image.fromarray(render(visual.model, seen, view, width=2 * width, height=2 * height))
     image = drawn.resize(TILE, Image.Resampling.LANCZOS)
     pen = ImageDraw.Draw(image)
     pen.rectangle([0, height - 15, pen.textlength(text) + 8, height], fill=PAPER)

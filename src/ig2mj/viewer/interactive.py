@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 
 from ig2mj.errors import EngineError, MissingDependencyError
+from ig2mj.looks import visual_of
 from ig2mj.scene.scene import Scene
 from ig2mj.viewer.label_space import Sight, off_texts, uncovered
 from ig2mj.viewer.mouse import Mouse
@@ -216,7 +217,8 @@ def open_viewer(
     """
     state, mouse = ViewerState(default_overlays(scene) if overlays is None else overlays, paused, more_keys), Mouse()
     keys: queue.SimpleQueue[int] = queue.SimpleQueue()
-    with _launch(scene.model, data, keys.put, panels) as handle:
+    visual = visual_of(scene)
+    with _launch(visual.model, visual.data(scene.model, data), keys.put, panels) as handle:
         first = camera() if camera is not None else None
         _look(handle.cam, home_overview(scene, data) if first is None else first)
         handle.set_texts([(mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos.mjGRID_TOPLEFT, *PREPARING)])
@@ -241,6 +243,7 @@ def open_viewer(
                 mouse.apply(scene.model, data, handle.perturb, _sight(handle.cam))
                 if state.wants_step():
                     step()
+                visual.data(scene.model, data)  # what the window has
                 if marks is not None:
                     handle.opt.flags[:] = marks
                 _look(handle.cam, camera() if camera is not None else None)

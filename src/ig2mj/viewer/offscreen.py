@@ -43,6 +43,7 @@ class FreeView:
       azimuth: direction of view about +z, degrees; 0 looks along +x, 90 along +y.
       elevation: of the direction of view above the horizon, degrees; -90 looks straight down.
       height: None for a perspective image; metres of world from the lower to the upper edge for an orthographic one.
+      fovy: vertical field of view of a perspective image, degrees; None: the model's.
     """
 
     lookat: Sequence[float | int]
@@ -50,6 +51,7 @@ class FreeView:
     azimuth: float | int = 90.0
     elevation: float | int = -45.0
     height: float | int | None = None
+    fovy: float | int | None = None
 
     @classmethod
     def around(cls, model: mujoco.MjModel, azimuth: float = 90.0, elevation: float = -45.0) -> FreeView:
@@ -172,6 +174,8 @@ def _render_gl(model, data, view, width, height, groups, segmentation, backend, 
                 camera.orthographic = 1
                 model.vis.global_.orthographic = 1
                 model.vis.global_.fovy = view.height
+            elif view.fovy is not None:
+                model.vis.global_.fovy = view.fovy
         else:
             camera = view
         if segmentation:

@@ -72,10 +72,13 @@ class PoolPages:
         """
         from PIL import Image
 
+        from ig2mj.looks import visual_of
         from ig2mj.viewer.offscreen import render
 
         view = home_overview(self.scene, self.data) if camera is None else camera
-        image = render(self.scene.model, self.data, view, width=size[0], height=size[1], **options)
+        visual = visual_of(self.scene)
+        data = visual.data(self.scene.model, self.data)
+        image = render(visual.model, data, view, width=size[0], height=size[1], **options)
         Image.fromarray(image).save(file)
 
 

@@ -18,7 +18,7 @@ from jaxtyping import Int
 
 from ig2mj.engine.snapshot import Snapshot, closed_circles
 from ig2mj.errors import EngineError, InputError
-from ig2mj.scene.scene import Scene
+from ig2mj.scene.scene import PLAIN, Scene
 from ig2mj.viewer.overlays import Label, default_overlays
 from ig2mj.viewer.overview import home_overview
 from ig2mj.worlds.recorder import read_dump
@@ -94,6 +94,7 @@ class Replay:
           MissingDependencyError: there is nothing to draw with, or no ffmpeg. InputError: no such format.
           EngineError: ffmpeg cannot write the file.
         """
+        from ig2mj.looks import visual_of
         from ig2mj.viewer.offscreen import render
         from ig2mj.viewer.video import VideoWriter
 
@@ -102,7 +103,9 @@ class Replay:
             for step in good:
                 self.show(int(step))
                 view = home_overview(self.scene, self.data) if camera is None else camera
-                video.add(render(self.scene.model, self.data, view, width=width, height=height))
+                visual = visual_of(self.scene)
+                data = visual.data(self.scene.model, self.data)
+                video.add(render(visual.model, data, view, width=width, height=height))
         return len(good)
 
     def _finite_steps(self) -> Int[np.ndarray, "N"]:
@@ -122,7 +125,8 @@ def _with_model(scene: Scene, model: mujoco.MjModel, file: str | os.PathLike) ->
     more |= {"geom_object": model.ngeom - geoms, "actuator_agent": model.nu - len(scene.tables.actuator_agent)}
     padded = {n: np.pad(getattr(scene.tables, n), (0, count), constant_values=-1) for n, count in more.items()}
     tables = dataclasses.replace(scene.tables, **padded)
-    return dataclasses.replace(scene, model=model, tables=tables)
+    looks = scene.looks if model.nbody == bodies else PLAIN  # files of the scene have no further agents
+    return dataclasses.replace(scene, model=model, tables=tables, looks=looks)
 
 
 class Progress:

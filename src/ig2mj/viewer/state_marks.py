@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ig2mj.engine.view import PhysicsView
-from ig2mj.scene.tables import SceneTables
 from ig2mj.sensors.render_model import mean_colours
 from ig2mj.sensors.tints import (
     DUST_COLOUR,
@@ -97,9 +96,9 @@ def _frame(normal: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
 class Tinter:
     """Colours the visual geoms of a model by state, and gives them their own colours back."""
 
-    def __init__(self, model: mujoco.MjModel, tables: SceneTables):
-        """Remembers the model's own colours."""
-        self._model, self._owner = model, np.asarray(tables.geom_object)
+    def __init__(self, model: mujoco.MjModel, owner: Int[np.ndarray, "G"]):
+        """Remembers the model's own colours. owner: object of each geom (`SceneTables.geom_object`)."""
+        self._model, self._owner = model, np.asarray(owner)
         self._rgba, self._material = model.geom_rgba.copy(), model.geom_matid.copy()
         self._mean = np.full((model.ngeom, 4), np.nan, np.float32)  # taken when first asked for: textures are large
 

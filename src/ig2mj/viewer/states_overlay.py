@@ -44,7 +44,7 @@ class StatesOverlay:
 
     def __init__(self, world: StatefulWorld, model: mujoco.MjModel):
         """`model` is the one that is drawn."""
-        self._world, self._tinter = world, Tinter(model, world.scene.tables)
+        self._world, self._tinter = world, Tinter(model, world.scene.tables.geom_object)
 
     def labels(self, data: mujoco.MjData) -> list[Label]:
         """One text per object that has something to tell."""

@@ -14,12 +14,17 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ig2mj.geometry.poses import quat_to_matrix
+from ig2mj.looks.light import Light, shade
 
 PLANE_SIZE = 20.0
 """Metres: what is drawn of a plane without end."""
 
 _UNSET = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's default rgba: with it a geom has the colour of its material."""
+
+
+_LIT = "_LIT"
+"""Attribute of vertices: what falls on them."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,11 +47,15 @@ def glb_of_geoms(
     geoms: Iterable[int],
     look: Look = PLAIN,
     frames: dict[int, tuple[np.ndarray, np.ndarray]] | None = None,
+    light: Light | None = None,
+    turn: Float[np.ndarray, "3 3"] | None = None,
 ) -> bytes:
     """Geoms as one GLB, those of the same material as one mesh.
 
     Args:
       frames: position [3] and quaternion [4] (w-x-y-z) of each geom; None: in the frame of its body.
+      light: is computed here, for each corner, so that the page shows the same shade as other renderers; None: the
+        page computes it. turn: from the frame of the vertices to the world, for `light`; None: they are the same.
     """
     import trimesh
     from trimesh.visual.texture import TextureVisuals
@@ -71,10 +80,23 @@ def glb_of_geoms(
         )
         material = _material(model, appearance, look)
         mesh.visual = TextureVisuals(uv=uv, material=material)
+        if light is not None:
+            normals = np.concatenate([p[1] for p in parts])
+            lit = shade(normals if turn is None else normals @ turn.T, light, appearance[3])
+            mesh.vertex_attributes[_LIT] = linear(lit).astype(np.float32)
         scene.add_geometry(mesh, geom_name=f"m{k}")
-    written = scene.export(file_type="glb", include_normals=True)
+    written = scene.export(file_type="glb", include_normals=True, tree_postprocessor=_show_light if light else None)
     assert isinstance(written, bytes)
     return written
+
+
+def _show_light(tree: dict[str, Any]) -> None:
+    """Lets a page show light that is computed already, and compute none."""
+    for primitive in (p for mesh in tree["meshes"] for p in mesh["primitives"]):
+        primitive["attributes"]["COLOR_0"] = primitive["attributes"].pop(_LIT)
+    for material in tree["materials"]:
+        material["extensions"] = {"KHR_materials_unlit": {}}
+    tree["extensionsUsed"] = ["KHR_materials_unlit"]
 
 
 def corners(

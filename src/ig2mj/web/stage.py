@@ -16,6 +16,9 @@ import numpy as np
 import viser
 from jaxtyping import Float
 
+from ig2mj.geometry.poses import quat_to_matrix
+from ig2mj.looks import Visual, visual_of
+from ig2mj.looks.light import Light, linear_lights
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors.render_model import BACKGROUND
 from ig2mj.states.definitions.water import DROP_RADIUS
@@ -57,13 +60,14 @@ class Stage:
           on_click: called with the object that is clicked. on_drag: called with viser's event, a body, and the event's
             node, while a movable body is dragged; None: nothing can be dragged.
         """
-        self._server, self._scene, self._model = server, scene, scene.model
+        self._server, self._scene, self._visual = server, scene, visual_of(scene)
+        self._model = self._visual.model
         self._on_click, self._on_drag = on_click, on_drag
-        data = scene.start_data()
-        mujoco.mj_kinematics(self._model, data)
-        self._pos, self._quat = data.xpos.copy(), data.xquat.copy()
+        start = scene.start_data()
+        self._pos, self._quat = start.xpos.copy(), start.xquat.copy()
         self._geoms: dict[int, list[int]] = {}
-        for g in _drawn(scene):
+        drawn = _drawn(scene, self._visual)
+        for g in (g for g in drawn if g < scene.model.ngeom):
             self._geoms.setdefault(int(self._model.geom_bodyid[g]), []).append(g)
         self._looks: dict[int, Look] = {}
         self._plain: dict[int, bytes] = {}
@@ -74,21 +78,50 @@ class Stage:
         self._line: Any = None
         self.sent = {"poses": 0, "geometries": 0}
         owner = np.asarray(scene.tables.body_object)
-        self._object_of = {body: int(owner[body]) for body in range(self._model.nbody)}
+        self._object_of = {body: int(owner[body]) for body in range(scene.model.nbody)}
         self._prepare()
         self._nodes = {body: self._add_body(body) for body in sorted(self._geoms)}
-        self._view(data)
+        self._add_decoration([g for g in drawn if g >= scene.model.ngeom])
+        self._view(start)
 
     def _prepare(self) -> None:
         scene = self._server.scene
         # No environment map: where a browser draws in software, preparing one takes longer than all the rest.
         scene.configure_environment_map(None)
         scene.configure_default_lights(enabled=False)
-        scene.add_light_hemisphere("/light/sky", sky_color=SKY, ground_color=GROUND, intensity=SKY_LIGHT)
-        scene.add_light_directional("/light/sun", color=SUN, intensity=SUN_LIGHT, position=SUN_FROM, cast_shadow=False)
+        if self._visual.light is None:
+            scene.add_light_hemisphere("/light/sky", sky_color=SKY, ground_color=GROUND, intensity=SKY_LIGHT)
+            sun: dict[str, Any] = {"color": SUN, "intensity": SUN_LIGHT, "position": SUN_FROM}
+            scene.add_light_directional("/light/sun", **sun, cast_shadow=False)
+        else:
+            self._light(self._visual.light)
         colour = np.round(np.array(BACKGROUND[:3]) * 255).astype(np.uint8)
         scene.set_background_image(np.tile(colour, (4, 4, 1)), format="png")
         scene.world_axes.visible = False
+
+    def _light(self, light: Light) -> None:
+        """Lights of the page for what turns; on all else light is computed before it is sent."""
+        ambient, lamps = linear_lights(light)
+        power = max(float(ambient.max()), 1e-6)
+        self._server.scene.add_light_ambient("/light/all", color=_rgb(tuple(ambient / power)), intensity=power * np.pi)
+        for k, ((direction, _), colour) in enumerate(zip(light.lamps, lamps, strict=True)):
+            power = max(float(colour.max()), 1e-6)
+            place = -10 * np.asarray(direction) / np.linalg.norm(direction)
+            lamp: dict[str, Any] = {"color": _rgb(tuple(colour / power)), "intensity": power * np.pi}
+            self._server.scene.add_light_directional(f"/light/{k}", **lamp, position=tuple(place), cast_shadow=False)
+
+    def _add_decoration(self, geoms: list[int]) -> None:
+        """What looks add to the home: one node, which no click is for."""
+        if geoms:
+            content = glb_of_geoms(self._model, geoms, light=self._visual.light)
+            self._server.scene.add_glb("/decoration", content, cast_shadow=False, receive_shadow=False)
+
+    def _glb(self, body: int, look: Look = PLAIN) -> bytes:
+        """A body's geometry. Light is computed here for those that never turn."""
+        turns = self._scene.model.body_weldid[body] != 0
+        turn = np.asarray(quat_to_matrix(self._quat[body]))
+        light = None if turns else self._visual.light
+        return glb_of_geoms(self._model, self._geoms[body], look, light=light, turn=turn)
 
     def _view(self, data: mujoco.MjData) -> None:
         """Where pages look from at first: the whole home, or a robot in it, over its shoulder."""
@@ -111,7 +144,7 @@ class Stage:
     def _add_body(self, body: int) -> Any:
         """One node has the pose and the geometry: a page takes 3 ms of processor time for each."""
         pose: dict[str, Any] = {"position": tuple(self._pos[body]), "wxyz": tuple(self._quat[body])}
-        self._plain[body] = glb_of_geoms(self._model, self._geoms[body])
+        self._plain[body] = self._glb(body)
         shown: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
         node = self._server.scene.add_glb(f"/b{body}", self._plain[body], **pose, **shown)
         self.sent["geometries"] += 1
@@ -120,8 +153,7 @@ class Stage:
 
     def _draw(self, body: int, look: Look) -> None:
         """Sends a body's geometry again, with other materials."""
-        plain, geoms = self._plain[body], self._geoms[body]
-        self._nodes[body].glb_data = plain if look == PLAIN else glb_of_geoms(self._model, geoms, look)
+        self._nodes[body].glb_data = self._plain[body] if look == PLAIN else self._glb(body, look)
         self.sent["geometries"] += 1
 
     def _listen(self, body: int, node: Any) -> None:
@@ -134,7 +166,7 @@ class Stage:
         async def _(event: Any) -> None:
             self._on_click(obj)
 
-        if self._on_drag is None or self._model.body_weldid[body] == 0:
+        if self._on_drag is None or self._scene.model.body_weldid[body] == 0:
             return
         on_drag = self._on_drag
 
@@ -220,7 +252,6 @@ class Stage:
         """Names above objects, or none."""
         if shown and not self._names:
             data = self._scene.start_data()
-            mujoco.mj_kinematics(self._model, data)
             for label in ObjectNames(self._scene).labels(data):
                 body = int(self._scene.tables.object_root[self._scene.object_index(label.text)])
                 if body not in self._geoms:
@@ -253,9 +284,9 @@ class Stage:
             self._line.points = ends.astype(np.float32)
 
 
-def _drawn(scene: Scene) -> list[int]:
+def _drawn(scene: Scene, visual: Visual) -> list[int]:
     """Visual geoms, and the collision geoms of objects that have none."""
-    model, owner = scene.model, np.asarray(scene.tables.geom_object)
+    model, owner = visual.model, visual.owner
     seen = visual_geoms(model)
     without = set(range(scene.tables.num_objects)) - set(owner[seen].tolist())
     others = visual_geoms(model, (3,))
