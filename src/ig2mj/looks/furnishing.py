@@ -171,10 +171,12 @@ class _Furnisher:
         self._rug()
         self._plants()
 
-    def _free(self, bottom: float, top: float, depth: float) -> list[Face]:
+    def _free(self, bottom: float | int, top: float | int, depth: float | int) -> list[Face]:
         return spans(self.plan, self.room.name, bottom, top, depth, 0.05, self.taken)
 
-    def _on_wall(self, width: float, bottom: float, top: float, depth: float, make, count: int = 1) -> int:
+    def _on_wall(
+        self, width: float | int, bottom: float | int, top: float | int, depth: float | int, make, count: int = 1
+    ) -> int:
         """Calls `make` with places in the middle of free stretches of wall and the length of each; widest first."""
         made = 0
         while made < count:
@@ -189,7 +191,7 @@ class _Furnisher:
             made += 1
         return made
 
-    def _take(self, face: Face, along: float, width: float, depth: float) -> None:
+    def _take(self, face: Face, along: float | int, width: float | int, depth: float | int) -> None:
         a, b = face.point(along - width / 2, 0.0, face.bottom), face.point(along + width / 2, depth, face.top)
         self.taken.append(Solid(np.minimum(a, b), np.maximum(a, b), "decoration"))
 
@@ -216,7 +218,7 @@ class _Furnisher:
                 dataclasses.replace(face, bottom=0.0, top=face.top + 0.15), (low + high) / 2, high - low + 0.6, 0.15
             )
 
-    def _near(self, s: Solid, face: Face, low: float, high: float, depth: float) -> bool:
+    def _near(self, s: Solid, face: Face, low: float | int, high: float | int, depth: float | int) -> bool:
         near, far = sorted((face.at, face.at + face.sign * depth))
         k = 1 - face.axis
         return bool(s.high[face.axis] > near and s.low[face.axis] < far and s.high[k] > low and s.low[k] < high)
@@ -245,7 +247,7 @@ class _Furnisher:
     def _entrance(self) -> None:
         """Coats on hooks and shoes below them."""
 
-        def make(place: Place, length: float) -> None:
+        def make(place: Place, length: float | int) -> None:
             width = min(1.1, length - 0.1)
             ornaments.coat_hooks(self.build, place.at(0, 0, 0.78), width, self.stock)
             self.build.paint((0.42, 0.36, 0.30), *place.put(mesh.box((0, 0.19, -0.935), (width, 0.34, 0.012))))
@@ -258,7 +260,7 @@ class _Furnisher:
         count, kind = SHELVES.get(self.room.kind, 0), self.room.kind
         rows = {"library": 2, "pantry_room": 2, "storage_room": 2, "home_office": 2}.get(kind, 1)
 
-        def make(place: Place, length: float) -> None:
+        def make(place: Place, length: float | int) -> None:
             for row in range(rows):
                 ornaments.wall_shelf(
                     self.build,
@@ -274,7 +276,7 @@ class _Furnisher:
         rng, stock = self.stock.rng, self.stock
         sizes = ((0.62, 0.45), (0.45, 0.6), (0.9, 0.6), (0.36, 0.36))
 
-        def make(place: Place, length: float) -> None:
+        def make(place: Place, length: float | int) -> None:
             width, height = pick(rng, [s for s in sizes if s[0] < length - 0.1])
             if length > 1.9 and rng.integers(2):
                 for x in (-0.5, 0.0, 0.5):

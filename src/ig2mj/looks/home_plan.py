@@ -27,6 +27,10 @@ OFF_GRID = 0.000237
 """m added before coordinates are compared by millimetres: those of plans are multiples of half of one."""
 
 
+Rectangle = tuple[np.ndarray, np.ndarray, int, int]
+"""Low and high corner [3], axis of its normal, and the normal's sign."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Face:
     """An upright rectangle of a wall.
@@ -40,18 +44,18 @@ class Face:
     room: str | None
     axis: int
     sign: int
-    at: float
-    low: float
-    high: float
-    bottom: float
-    top: float
+    at: float | int
+    low: float | int
+    high: float | int
+    bottom: float | int
+    top: float | int
 
     @property
     def turn(self) -> float:
         """Angle about the vertical that turns +y into its normal, rad."""
         return (0.0 if self.axis == 1 else -math.pi / 2) + (0.0 if self.sign > 0 else math.pi)
 
-    def point(self, along: float, out: float, z: float) -> np.ndarray:
+    def point(self, along: float | int, out: float | int, z: float | int) -> np.ndarray:
         """World position [3] of a point `out` m before the face."""
         pos = np.array([0.0, 0.0, z])
         pos[self.axis], pos[1 - self.axis] = self.at + self.sign * out, along
@@ -87,7 +91,7 @@ class Opening:
     outside: bool
 
     @property
-    def along(self) -> tuple[float, float]:
+    def along(self) -> tuple[float | int, float | int]:
         """Its edges along the wall, m."""
         k = 1 - self.face.axis
         return float(self.solid.low[k]), float(self.solid.high[k])
@@ -119,11 +123,11 @@ class HomePlan:
     name: str
     rooms: tuple[Room, ...]
     faces: tuple[Face, ...]
-    floors: tuple[tuple[np.ndarray, np.ndarray, float, str | None], ...]
+    floors: tuple[tuple[np.ndarray, np.ndarray, float | int, str | None], ...]
     solids: tuple[Solid, ...]
     windows: tuple[Opening, ...]
     doors: tuple[Opening, ...]
-    height: float
+    height: float | int
     low: Float[np.ndarray, "2"]
     high: Float[np.ndarray, "2"]
 
@@ -147,7 +151,7 @@ def read_plan(scene: Scene) -> HomePlan | None:
     faces.sort(key=lambda f: (f.room or "", f.axis, f.sign, f.at, f.low, f.bottom))
     height = float(np.median([f.top for f in faces if f.room] or [max(f.top for f in faces)]))
     floors = []
-    for low, high in _rectangles(scene, data, "floors", upright=False):
+    for low, high, _, _ in _rectangles(scene, data, "floors", upright=False):
         floors.append((low[:2], high[:2], float(high[2]), rooms.room_at((low + high)[:2] / 2)))
     found = tuple(_room(scene, rooms, name, kind) for name, kind in zip(rooms.names, rooms.types, strict=True))
     solids = tuple(_solids(scene, data))
@@ -172,13 +176,13 @@ def seed_of(*names: str) -> int:
     return zlib.crc32("/".join(names).encode())
 
 
-def _rectangles(scene: Scene, data: mujoco.MjData, category: str, upright: bool) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Low and high corner [3] of rectangles in the visual meshes of a part of the building, with, for upright ones,
-    their outward normal as a third array: faces along an axis that are two triangles."""
+def _rectangles(scene: Scene, data: mujoco.MjData, category: str, upright: bool) -> list[Rectangle]:
+    """Rectangles in the visual meshes of a part of the building, upright ones or those that look up: faces along an
+    axis that are two triangles."""
     model, tables = scene.model, scene.tables
     objects = [k for k, entry in enumerate(scene.manifest.objects) if entry.category == category]
     geoms = np.flatnonzero(np.isin(tables.geom_object, objects) & (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH))
-    found: list[tuple] = []
+    found: list[Rectangle] = []
     for geom in geoms:
         if model.geom_group[geom] > 2 or (upright and model.geom_matid[geom] >= 0):
             continue
@@ -200,11 +204,11 @@ def _rectangles(scene: Scene, data: mujoco.MjData, category: str, upright: bool)
         for (axis, positive, _), members in pairs.items():
             if len(members) == 2:
                 low, high = members[0]
-                found.append((low, high, axis, 1 if positive else -1) if upright else (low, high))
+                found.append((low, high, axis, 1 if positive else -1))
     return found
 
 
-def _by_room(rectangle: tuple, rooms: Rooms) -> list[Face]:
+def _by_room(rectangle: Rectangle, rooms: Rooms) -> list[Face]:
     """The rectangle in pieces, each before one room."""
     low, high, axis, sign = rectangle
     other = 1 - axis
@@ -296,10 +300,10 @@ def _openings(solids: Sequence[Solid], faces: list[Face], rooms: Rooms, category
 def spans(
     plan: HomePlan,
     room: str,
-    bottom: float,
-    top: float,
-    depth: float,
-    margin: float = 0.05,
+    bottom: float | int,
+    top: float | int,
+    depth: float | int,
+    margin: float | int = 0.05,
     taken: Sequence[Solid] = (),
 ) -> list[Face]:
     """Stretches of a room's walls that are free between two heights, as far as `depth` m before them."""
@@ -333,7 +337,9 @@ def spans(
     return found
 
 
-def _without(low: float, high: float, blocked: list[tuple[float, float]]) -> list[tuple[float, float]]:
+def _without(
+    low: float | int, high: float | int, blocked: list[tuple[float | int, float | int]]
+) -> list[tuple[float | int, float | int]]:
     """What is left of an interval."""
     left = [(low, high)]
     for a, b in blocked:

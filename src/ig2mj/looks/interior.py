@@ -56,7 +56,7 @@ def add_interior(build: Builder, plan: HomePlan, light: Light) -> None:
         _sockets(build, plan, room)
 
 
-def _wall(face: Face, height: float) -> Triangles:
+def _wall(face: Face, height: float | int) -> Triangles:
     """The face, a little before itself; its texture goes from the floor to the ceiling."""
     up = np.array([0, 0, face.top - face.bottom])
     start, end = face.point(face.low, SKIN, face.bottom), face.point(face.high, SKIN, face.bottom)
@@ -177,7 +177,7 @@ def _splashback(build: Builder, plan: HomePlan, room: Room) -> None:
             build.add(material, Triangles(tiled.vertices + out, tiled.normals, uv, tiled.faces))
 
 
-def _metro_tiles(rgb: tuple[float, float, float], seed: int, size: int = 120) -> Texture:
+def _metro_tiles(rgb: tuple[float | int, float | int, float | int], seed: int, size: int = 120) -> Texture:
     y, x = np.mgrid[:size, :size] * 0.6 / size
     row = np.floor(y / 0.1).astype(int)
     along = x + 0.1 * (row % 2)

@@ -14,7 +14,7 @@ import numpy as np
 SUN = "sun"
 """Name of the light that homes have."""
 
-Vector = tuple[float, float, float]
+Vector = tuple[float | int, float | int, float | int]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Light:
     ambient: Vector
     lamps: tuple[tuple[Vector, Vector], ...]
     outside: Vector
-    glow: float
+    glow: float | int
     sun: bool
 
 
@@ -80,7 +80,7 @@ def _set(one, direction: Vector, colour: Vector) -> None:
     one.castshadow, one.active = False, True
 
 
-def shade(normals: np.ndarray, light: Light, emission: float = 0.0) -> np.ndarray:
+def shade(normals: np.ndarray, light: Light, emission: float | int = 0.0) -> np.ndarray:
     """What falls on surfaces with these normals [V, 3], rgb of 0..1 [V, 3]."""
     total = np.tile(np.asarray(light.ambient) + emission, (len(normals), 1))
     for direction, colour in light.lamps:

@@ -25,10 +25,10 @@ class Material:
 
     name: str
     image: Texture | None = None
-    rgba: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    specular: float = 0.0
-    shininess: float = 0.0
-    emission: float = 0.0
+    rgba: tuple[float | int, float | int, float | int, float | int] = (1.0, 1.0, 1.0, 1.0)
+    specular: float | int = 0.0
+    shininess: float | int = 0.0
+    emission: float | int = 0.0
 
 
 def noise(shape: tuple[int, int], cells: tuple[int, int], rng: np.random.Generator) -> Float[np.ndarray, "R X"]:
@@ -53,18 +53,20 @@ def fractal(shape: tuple[int, int], cells: tuple[int, int], rng: np.random.Gener
     return total / (2 - 2.0 ** (1 - octaves))
 
 
-def shaded(rgb: np.ndarray | tuple[float, ...], shade: Float[np.ndarray, "R X"], depth: float) -> Texture:
+def shaded(rgb: np.ndarray | tuple[float | int, ...], shade: Float[np.ndarray, "R X"], depth: float | int) -> Texture:
     """A colour whose brightness follows `shade` (-1..1)."""
     return np.clip(np.asarray(rgb, float) * (1 + depth * shade[..., None]), 0, 1)
 
 
-def mixed(a: np.ndarray | tuple[float, ...], b: np.ndarray | tuple[float, ...], share: np.ndarray) -> Texture:
+def mixed(
+    a: np.ndarray | tuple[float | int, ...], b: np.ndarray | tuple[float | int, ...], share: np.ndarray
+) -> Texture:
     """(1 - share) a + share b, for every texel."""
     share = np.clip(share, 0, 1)[..., None]
     return (1 - share) * np.asarray(a, float) + share * np.asarray(b, float)
 
 
-def fabric(rgb: tuple[float, ...], seed: int, size: int = 96) -> Texture:
+def fabric(rgb: tuple[float | int, ...], seed: int, size: int = 96) -> Texture:
     """Woven cloth."""
     rng = np.random.default_rng(seed)
     y, x = np.mgrid[:size, :size]
@@ -72,7 +74,7 @@ def fabric(rgb: tuple[float, ...], seed: int, size: int = 96) -> Texture:
     return shaded(rgb, 0.5 * (weave - 0.7) + 0.5 * fractal((size, size), (6, 6), rng), 0.14)
 
 
-def wood(rgb: tuple[float, ...], seed: int, shape: tuple[int, int] = (64, 256)) -> Texture:
+def wood(rgb: tuple[float | int, ...], seed: int, shape: tuple[int, int] = (64, 256)) -> Texture:
     """Grain along u."""
     rng = np.random.default_rng(seed)
     grain = fractal(shape, (24, 3), rng, 3)
@@ -80,7 +82,7 @@ def wood(rgb: tuple[float, ...], seed: int, shape: tuple[int, int] = (64, 256)) 
     return shaded(rgb, 0.7 * grain + 0.3 * rings, 0.22)
 
 
-def stone(rgb: tuple[float, ...], seed: int, size: int = 128) -> Texture:
+def stone(rgb: tuple[float | int, ...], seed: int, size: int = 128) -> Texture:
     """Marble-like: clouds and veins."""
     rng = np.random.default_rng(seed)
     cloud = fractal((size, size), (3, 3), rng, 5)
@@ -88,18 +90,18 @@ def stone(rgb: tuple[float, ...], seed: int, size: int = 128) -> Texture:
     return shaded(shaded(rgb, cloud, 0.10), -np.clip(vein, 0, 1), 0.16)
 
 
-def metal(rgb: tuple[float, ...], seed: int, size: int = 96) -> Texture:
+def metal(rgb: tuple[float | int, ...], seed: int, size: int = 96) -> Texture:
     """Brushed along u."""
     rng = np.random.default_rng(seed)
     return shaded(rgb, noise((size, size), (size, 3), rng), 0.10)
 
 
-def ceramic(rgb: tuple[float, ...], seed: int, size: int = 64) -> Texture:
+def ceramic(rgb: tuple[float | int, ...], seed: int, size: int = 64) -> Texture:
     """Glazed, almost even."""
     return shaded(rgb, fractal((size, size), (3, 3), np.random.default_rng(seed)), 0.03)
 
 
-def glass(rgb: tuple[float, ...], seed: int, size: int = 64) -> Texture:
+def glass(rgb: tuple[float | int, ...], seed: int, size: int = 64) -> Texture:
     """What is seen in a pane or a mirror: light bands across."""
     y, x = np.mgrid[:size, :size] / size
     band = np.sin(2 * np.pi * (1.2 * (x + y) + np.random.default_rng(seed).uniform()))

@@ -21,8 +21,8 @@ from ig2mj.looks.materials import Material
 CELLS = 16
 """Squares along each side of the texture of plain colours."""
 
-Colour = tuple[float, float, float]
-Vector = Sequence[float] | np.ndarray
+Colour = tuple[float | int, float | int, float | int]
+Vector = Sequence[float | int] | np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Triangles:
     uv: Float[np.ndarray, "V 2"]
     faces: Int[np.ndarray, "F 3"]
 
-    def moved(self, pos: Vector = (0, 0, 0), turn: float = 0.0, scale: float = 1.0) -> Triangles:
+    def moved(self, pos: Vector = (0, 0, 0), turn: float | int = 0.0, scale: float | int = 1.0) -> Triangles:
         """Scaled, turned about the vertical (rad), and put at `pos`."""
         c, s = math.cos(turn), math.sin(turn)
         matrix = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
@@ -76,7 +76,7 @@ def quad(
     return Triangles(corners, np.tile(normal, (4, 1)), uv, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-def sheet(corner: Vector, along: Vector, up: Vector, uv: Sequence[float], step: float = 0.0) -> Triangles:
+def sheet(corner: Vector, along: Vector, up: Vector, uv: Sequence[float | int], step: float | int = 0.0) -> Triangles:
     """A rectangle in pieces of about `step` m (0: one piece), so that light that is computed at corners varies on it.
 
     Args:
@@ -117,7 +117,7 @@ def box(middle: Vector, size: Vector, without: str = "") -> Triangles:
     return joined(faces)
 
 
-def lathe(profile: Sequence[tuple[float, float]], pos: Vector = (0, 0, 0), sides: int = 12) -> Triangles:
+def lathe(profile: Sequence[tuple[float | int, float | int]], pos: Vector = (0, 0, 0), sides: int = 12) -> Triangles:
     """A body of revolution about the vertical: (radius, height) from below to above, in m; its outside is its front."""
     points = np.array(profile, float)
     angle = np.linspace(0, 2 * np.pi, sides + 1)
@@ -155,7 +155,7 @@ def ball(radius: float | Vector, pos: Vector = (0, 0, 0), sides: int = 10) -> Tr
     return Triangles(made.vertices * radii + np.asarray(pos, float), normals, made.uv, made.faces)
 
 
-def rod(start: Vector, end: Vector, radius: float, sides: int = 8) -> Triangles:
+def rod(start: Vector, end: Vector, radius: float | int, sides: int = 8) -> Triangles:
     """A round rod without ends."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(end - start))

@@ -40,12 +40,12 @@ class Place:
     """Where, and how turned about the vertical (rad)."""
 
     pos: np.ndarray
-    turn: float = 0.0
+    turn: float | int = 0.0
 
     def put(self, *parts: Triangles) -> list[Triangles]:
         return [p.moved(self.pos, self.turn) for p in parts]
 
-    def at(self, x: float, y: float, z: float) -> Place:
+    def at(self, x: float | int, y: float | int, z: float | int) -> Place:
         """A place in the frame of this one."""
         c, s = math.cos(self.turn), math.sin(self.turn)
         return Place(self.pos + np.array([c * x - s * y, s * x + c * y, z]), self.turn)
@@ -68,7 +68,7 @@ def pick(rng: np.random.Generator, choices):
 # ------------------------------------------------------------------------------------------------ on walls
 
 
-def picture(build: Builder, place: Place, width: float, height: float, stock: Stock) -> None:
+def picture(build: Builder, place: Place, width: float | int, height: float | int, stock: Stock) -> None:
     """A framed picture, its middle at the place."""
     rng, frame = stock.rng, 0.025
     mount = 0.045 if min(width, height) > 0.3 else 0.02
@@ -92,7 +92,7 @@ def picture(build: Builder, place: Place, width: float, height: float, stock: St
     build.add(stock.art, *place.put(_facing(width - 2 * mount, height - 2 * mount, 0.011, uv)))
 
 
-def _facing(width: float, height: float, out: float, uv=None) -> Triangles:
+def _facing(width: float | int, height: float | int, out: float | int, uv=None) -> Triangles:
     """A rectangle that looks away from the wall."""
     w, h = width / 2, height / 2
     return mesh.quad([(w, out, -h), (-w, out, -h), (-w, out, h), (w, out, h)], uv)
@@ -186,7 +186,9 @@ def _moon(rng, size) -> Texture:
     return mixed(image, (0.06, 0.09, 0.14), np.clip((ridge - y) * 80, 0, 1))
 
 
-def wall_shelf(build: Builder, place: Place, width: float, kind: str, stock: Stock, depth: float = 0.19) -> None:
+def wall_shelf(
+    build: Builder, place: Place, width: float | int, kind: str, stock: Stock, depth: float | int = 0.19
+) -> None:
     """A board on the wall at the place, with what a room of that kind has on it."""
     rng = stock.rng
     build.paint(
@@ -203,7 +205,7 @@ def wall_shelf(build: Builder, place: Place, width: float, kind: str, stock: Sto
         x += used + float(rng.uniform(0.015, 0.05))
 
 
-def books(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def books(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     """A row of books; returns the width that it takes."""
     rng, x = stock.rng, 0.0
     for _ in range(int(rng.integers(4, 10))):
@@ -224,14 +226,14 @@ def books(build: Builder, place: Place, room: float, stock: Stock) -> float:
     return x
 
 
-def small_plant(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def small_plant(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     if room < 0.16:
         return 0.0
     plant(build, place.at(0.08, 0.06, 0.0), 0.24, stock, trailing=bool(stock.rng.integers(2)))
     return 0.16
 
 
-def vase(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def vase(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     if room < 0.12:
         return 0.0
     h = float(stock.rng.uniform(0.14, 0.22))
@@ -240,14 +242,14 @@ def vase(build: Builder, place: Place, room: float, stock: Stock) -> float:
     return 0.12
 
 
-def standing_frame(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def standing_frame(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     if room < 0.2:
         return 0.0
     picture(build, place.at(0.09, 0.01, 0.105), 0.15, 0.19, stock)
     return 0.19
 
 
-def jar(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def jar(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     if room < 0.11:
         return 0.0
     h = float(stock.rng.uniform(0.10, 0.17))
@@ -263,7 +265,7 @@ def jar(build: Builder, place: Place, room: float, stock: Stock) -> float:
     return 0.11
 
 
-def bottle(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def bottle(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     if room < 0.08:
         return 0.0
     h = float(stock.rng.uniform(0.15, 0.21))
@@ -281,7 +283,7 @@ def bottle(build: Builder, place: Place, room: float, stock: Stock) -> float:
     return 0.08
 
 
-def folded_towels(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def folded_towels(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     if room < 0.3:
         return 0.0
     for k in range(3):
@@ -290,7 +292,7 @@ def folded_towels(build: Builder, place: Place, room: float, stock: Stock) -> fl
     return 0.28
 
 
-def toy(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def toy(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     """A teddy bear, or blocks."""
     rng = stock.rng
     if room < 0.18:
@@ -318,7 +320,7 @@ def toy(build: Builder, place: Place, room: float, stock: Stock) -> float:
     return 0.14
 
 
-def box_file(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def box_file(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     if room < 0.1:
         return 0.0
     colour = pick(stock.rng, ((0.30, 0.42, 0.55), (0.85, 0.82, 0.76), (0.72, 0.35, 0.30), (0.35, 0.36, 0.38)))
@@ -327,7 +329,7 @@ def box_file(build: Builder, place: Place, room: float, stock: Stock) -> float:
     return 0.085
 
 
-def carton(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def carton(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     if room < 0.27:
         return 0.0
     h = float(stock.rng.uniform(0.14, 0.22))
@@ -336,7 +338,7 @@ def carton(build: Builder, place: Place, room: float, stock: Stock) -> float:
     return 0.26
 
 
-def paint_can(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def paint_can(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     if room < 0.17:
         return 0.0
     at, colour = place.at(0.08, 0.08, 0), pick(stock.rng, ((0.30, 0.50, 0.62), (0.80, 0.45, 0.25), (0.88, 0.80, 0.52)))
@@ -351,7 +353,7 @@ def paint_can(build: Builder, place: Place, room: float, stock: Stock) -> float:
     return 0.17
 
 
-def basket(build: Builder, place: Place, room: float, stock: Stock) -> float:
+def basket(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     if room < 0.27:
         return 0.0
     build.paint((0.72, 0.58, 0.40), *place.put(mesh.box((0.13, 0.08, 0.07), (0.25, 0.15, 0.14), "+z")))
@@ -359,7 +361,7 @@ def basket(build: Builder, place: Place, room: float, stock: Stock) -> float:
     return 0.27
 
 
-Item = Callable[[Builder, Place, float, Stock], float]
+Item = Callable[[Builder, Place, float | int, Stock], float | int]
 ON_SHELVES: dict[str, tuple[Item, ...]] = {
     "living_room": (books, books, small_plant, vase, standing_frame),
     "television_room": (books, vase, standing_frame),
@@ -380,7 +382,7 @@ ON_SHELVES: dict[str, tuple[Item, ...]] = {
 }
 
 
-def coat_hooks(build: Builder, place: Place, width: float, stock: Stock) -> None:
+def coat_hooks(build: Builder, place: Place, width: float | int, stock: Stock) -> None:
     """A board with hooks, coats and a bag, its middle at the place."""
     build.paint(pick(stock.rng, WOODS), *place.put(mesh.box((0, 0.012, 0), (width, 0.024, 0.09), "-y")))
     count = max(2, int(width / 0.2))
@@ -452,7 +454,7 @@ def towel_rail(build: Builder, place: Place, stock: Stock) -> None:
         build.paint(dark, *place.put(mesh.box((x, 0.0755, -0.38), (w, 0.015, 0.03))))
 
 
-def utensil_rail(build: Builder, place: Place, width: float, stock: Stock) -> None:
+def utensil_rail(build: Builder, place: Place, width: float | int, stock: Stock) -> None:
     """A rail with ladles and pans."""
     build.paint(STEEL, *place.put(mesh.rod((-width / 2, 0.035, 0), (width / 2, 0.035, 0), 0.007)))
     x, k = -width / 2 + 0.06, 0
@@ -476,7 +478,7 @@ def utensil_rail(build: Builder, place: Place, width: float, stock: Stock) -> No
         k += 1
 
 
-def clothes_rail(build: Builder, place: Place, width: float, stock: Stock) -> None:
+def clothes_rail(build: Builder, place: Place, width: float | int, stock: Stock) -> None:
     """A rail on the wall with clothes on it."""
     build.paint(STEEL, *place.put(mesh.rod((-width / 2, 0.16, 0), (width / 2, 0.16, 0), 0.012)))
     for x in (-width / 2 + 0.03, width / 2 - 0.03):
@@ -488,7 +490,7 @@ def clothes_rail(build: Builder, place: Place, width: float, stock: Stock) -> No
         x += float(stock.rng.uniform(0.1, 0.16))
 
 
-def bunting(build: Builder, place: Place, width: float, stock: Stock) -> None:
+def bunting(build: Builder, place: Place, width: float | int, stock: Stock) -> None:
     """Flags on a string along the wall, hanging from both ends of `width`."""
     count = max(4, int(width / 0.16))
     for k in range(count):
@@ -557,7 +559,7 @@ def pinned_papers(build: Builder, place: Place, stock: Stock) -> None:
 # ---------------------------------------------------------------------------------------------- on the floor
 
 
-def plant(build: Builder, place: Place, height: float, stock: Stock, trailing: bool = False) -> None:
+def plant(build: Builder, place: Place, height: float | int, stock: Stock, trailing: bool = False) -> None:
     """A plant in a pot that stands at the place, `height` m high with its leaves."""
     rng = stock.rng
     pot = 0.30 * height if height > 0.5 else 0.42 * height
@@ -589,7 +591,7 @@ def plant(build: Builder, place: Place, height: float, stock: Stock, trailing: b
         )
 
 
-def leaf(length: float, width: float, steep: float, bend: float) -> Triangles:
+def leaf(length: float | int, width: float | int, steep: float | int, bend: float | int) -> Triangles:
     """A blade that rises from the origin towards +x, both sides."""
     steps, pos, angle = 4, np.zeros(2), steep
     spine, half = [pos], [0.25 * width]
@@ -609,7 +611,7 @@ def leaf(length: float, width: float, steep: float, bend: float) -> Triangles:
 # ---------------------------------------------------------------------------------------- at the ceiling, at windows
 
 
-def pendant(build: Builder, place: Place, drop: float, kind: str, stock: Stock) -> None:
+def pendant(build: Builder, place: Place, drop: float | int, kind: str, stock: Stock) -> None:
     """A lamp that hangs `drop` m below the ceiling at the place."""
     rng = stock.rng
     if kind == "globe":
@@ -650,7 +652,9 @@ def pendant(build: Builder, place: Place, drop: float, kind: str, stock: Stock) 
     )
 
 
-def curtains(build: Builder, place: Place, width: float, top: float, bottom: float, cloth: Material) -> None:
+def curtains(
+    build: Builder, place: Place, width: float | int, top: float | int, bottom: float | int, cloth: Material
+) -> None:
     """Two curtains on a rod, to both sides of `width` m; `top` and `bottom` are heights above the place."""
     reach = width / 2 + 0.22
     build.paint(
@@ -676,7 +680,9 @@ def curtains(build: Builder, place: Place, width: float, top: float, bottom: flo
         build.add(cloth, *place.put(*parts))
 
 
-def blind(build: Builder, place: Place, width: float, top: float, drop: float, colour: Colour) -> None:
+def blind(
+    build: Builder, place: Place, width: float | int, top: float | int, drop: float | int, colour: Colour
+) -> None:
     """A roller blind, a part of its way down."""
     build.paint(
         (0.90, 0.90, 0.89),
@@ -686,7 +692,7 @@ def blind(build: Builder, place: Place, width: float, top: float, drop: float, c
     build.paint((0.80, 0.79, 0.76), *place.put(mesh.box((0, 0.06, top - drop), (width + 0.06, 0.014, 0.02))))
 
 
-def rug_texture(kind: str, seed: int, aspect: float, size: int = 128) -> Texture:
+def rug_texture(kind: str, seed: int, aspect: float | int, size: int = 128) -> Texture:
     """A rug, all of it once. kind: "border", "kilim" or "round"."""
     rng = np.random.default_rng(seed)
     shape = (size, max(32, round(size * aspect)))
@@ -718,6 +724,6 @@ def rug_texture(kind: str, seed: int, aspect: float, size: int = 128) -> Texture
     return shaded(image, fractal(shape, (60, 60), rng, 2), 0.10)
 
 
-def cloth(name: str, rgb: Colour, seed: int, light: float = 0.06) -> Material:
+def cloth(name: str, rgb: Colour, seed: int, light: float | int = 0.06) -> Material:
     """A curtain's: some light comes through."""
     return Material(name, fabric(rgb, seed), emission=light)

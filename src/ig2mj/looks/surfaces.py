@@ -25,7 +25,7 @@ WALL_WIDTH = 1.2
 FLOOR_PER_METRE, MOST_TEXELS = 110, 900
 """Texels of floors, and of a floor's longest side."""
 
-RGB = tuple[float, float, float]
+RGB = tuple[float | int, float | int, float | int]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,7 +67,7 @@ STYLES: dict[str, WallStyle] = {
 FACADE = WallStyle("plaster", (((0.93, 0.90, 0.83), WHITE), ((0.86, 0.80, 0.70), WHITE), ((0.80, 0.84, 0.84), WHITE)))
 
 
-def wall_texture(style: WallStyle, height: float, seed: int) -> Texture:
+def wall_texture(style: WallStyle, height: float | int, seed: int) -> Texture:
     """A wall from the floor to the ceiling (m), `WALL_WIDTH` wide."""
     rng = np.random.default_rng(seed)
     shape = (round(PER_METRE * height), round(PER_METRE * WALL_WIDTH))
@@ -201,7 +201,7 @@ def floor_texture(
     low: Float[np.ndarray, "2"],
     high: Float[np.ndarray, "2"],
     seed: int,
-    shadows: Sequence[tuple[np.ndarray, np.ndarray, float]] = (),
+    shadows: Sequence[tuple[np.ndarray, np.ndarray, float | int]] = (),
     sun: Sequence[Float[np.ndarray, "n 2"]] = (),
     sides: Sequence[bool] = (True, True, True, True),
 ) -> Texture:
