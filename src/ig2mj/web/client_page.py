@@ -4,7 +4,8 @@ viser keeps its page in one file: style sheet and program are compressed, writte
 page, and compiled each time that the page is opened. Here they are files of their own, which a browser compiles
 while it loads them and keeps compiled; they are named by their content, so that it may keep them for good. The program
 begins without the lights and the environment map that it would otherwise prepare before it hears which lights the home
-has: where a browser draws in software, those alone take a second.
+has: where a browser draws in software, those alone take a second. It shows colours as they are sent, without the
+contrast of a film that it would otherwise give them.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ _DECODER = re.compile(r'gzWasm="((?:[^"\\]|\\.)*)"')
 _FIRST_LIGHTS = "enableDefaultLights:!0,enableDefaultLightsShadows:!0,environmentMap:null"
 _NO_LIGHTS = "enableDefaultLights:!1,enableDefaultLightsShadows:!1,environmentMap:{hdri_data:null}"
 """The state of the page before the server's first message; a message that comes later replaces it."""
+
+_TONE_MAPPING = re.compile(r"\.toneMapping=\w\?0:4")
+"""Where the program chooses a film's contrast; without it colours are those that were sent."""
 
 _PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>ig2mj</title>
 <link rel="icon" href="data:,"><meta name="viewport" content="width=device-width, initial-scale=1">
@@ -54,6 +58,9 @@ def client_files() -> dict[str, bytes]:
     unpacked = zstandard.ZstdDecompressor().decompress(from_letters(packed, letters))
     style, program = unpacked[: int(style_size)], unpacked[int(style_size) :].decode()
     if len(unpacked) != int(style_size) + int(program_size) or program.count(_FIRST_LIGHTS) != 1:
+        raise ValueError("another program")
+    program, count = _TONE_MAPPING.subn(".toneMapping=0", program)
+    if count != 1:
         raise ValueError("another program")
     wasm = gzip.decompress(from_letters(json.loads(f'"{decoder[1]}"'), letters))
     names = {"style": _named("viser", ".css", style), "decoder": _named("decoder", ".wasm", wasm)}

@@ -37,7 +37,7 @@ ROBOT_HEIGHT, ROBOT_DISTANCE = 0.8, 4.5
 SKY, GROUND, SUN = (255, 255, 255), (170, 165, 160), (255, 250, 240)
 """Colours of the light from above, from below, and of the sun."""
 
-SKY_LIGHT, SUN_LIGHT, SUN_FROM = 2.6, 1.6, (3.0, -4.0, 8.0)
+SKY_LIGHT, SUN_LIGHT, SUN_FROM = 1.9, 1.0, (3.0, -4.0, 8.0)
 """three.js's intensities, with which a white wall is just not white, and where the sun stands."""
 
 BUILDING = frozenset({"walls", "floors", "ceilings"})
