@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ig2mj.looks import mesh, ornaments
+from ig2mj.looks import drawings, mesh, ornaments, shelves
 from ig2mj.looks.home_plan import Face, HomePlan, Room, Solid, seed_of, spans
 from ig2mj.looks.light import Light
 from ig2mj.looks.materials import Material
@@ -101,7 +101,7 @@ PLANT_HEIGHT, PLANT_RADIUS = 1.05, 0.17
 
 def add_furnishing(build: Builder, plan: HomePlan, light: Light) -> None:
     """Adds what each room is decorated with."""
-    art = Material("art", ornaments.art_texture(seed_of(plan.name, "art")), specular=0.1, shininess=0.5)
+    art = Material("art", drawings.art_texture(seed_of(plan.name, "art")), specular=0.1, shininess=0.5)
     glow = Material("glow", None, rgba=(1.0, 0.90, 0.72, 1.0), emission=light.glow)
     for room in plan.rooms:
         _Furnisher(build, plan, room, Stock(art, glow, np.random.default_rng(room.seed))).add()
@@ -262,7 +262,7 @@ class _Furnisher:
 
         def make(place: Place, length: float | int) -> None:
             for row in range(rows):
-                ornaments.wall_shelf(
+                shelves.wall_shelf(
                     self.build,
                     place.at(0, 0, 0.37 * row - 0.28 + 0.1 * (rows == 1)),
                     min(1.3, length - 0.1),
@@ -311,7 +311,7 @@ class _Furnisher:
         middle = np.clip(middle, self.room.low + size / 2 + 0.15, self.room.high - size / 2 - 0.15)
         turned = size[1] > size[0]
         long, short = max(size), min(size)
-        material = Material(f"rug_{self.room.name}", ornaments.rug_texture(kind, self.room.seed, float(long / short)))
+        material = Material(f"rug_{self.room.name}", drawings.rug_texture(kind, self.room.seed, float(long / short)))
         low, high = middle - size / 2, middle + size / 2
         corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
         if turned:

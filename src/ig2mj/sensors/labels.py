@@ -24,7 +24,8 @@ from jaxtyping import Int
 
 from ig2mj.engine.view import Array
 from ig2mj.knowledge.taxonomy import categories
-from ig2mj.scene.scene import Scene
+from ig2mj.looks import visual_of
+from ig2mj.scene.scene import PLAIN, Scene
 from ig2mj.sensors.particle_slots import Slots
 
 NUM_CLASSES, NUM_INSTANCES = 512, 1024
@@ -47,22 +48,23 @@ def class_names() -> dict[int, str]:
     )
 
 
-def classes_of_geoms(scene: Scene) -> Int[np.ndarray, "G"]:
-    """Class of every geom of the scene."""
+def classes_of_geoms(scene: Scene, looks: str = PLAIN) -> Int[np.ndarray, "G"]:
+    """Class of every geom of the scene, and of those that its looks add."""
     tables = scene.tables
     known = class_of_category()
     of_objects = np.array([known.get(c, OTHER) for c in tables.object_categories], np.int32)
-    return _of_geoms(scene, of_objects, lambda agent: ROBOT, OTHER)
+    return _of_geoms(scene, looks, of_objects, lambda agent: ROBOT, OTHER)
 
 
-def instances_of_geoms(scene: Scene) -> Int[np.ndarray, "G"]:
-    """Instance of every geom of the scene."""
+def instances_of_geoms(scene: Scene, looks: str = PLAIN) -> Int[np.ndarray, "G"]:
+    """Instance of every geom of the scene, and of those that its looks add."""
     count = scene.tables.num_objects
-    return _of_geoms(scene, np.arange(1, count + 1, dtype=np.int32), lambda agent: count + 1 + agent, BACKGROUND)
+    return _of_geoms(scene, looks, np.arange(1, count + 1, dtype=np.int32), lambda agent: count + 1 + agent, BACKGROUND)
 
 
-def _of_geoms(scene: Scene, of_objects: np.ndarray, of_agent, other: int) -> Int[np.ndarray, "G"]:
-    owner, agent = scene.tables.geom_object, scene.tables.body_agent[scene.model.geom_bodyid]
+def _of_geoms(scene: Scene, looks: str, of_objects: np.ndarray, of_agent, other: int) -> Int[np.ndarray, "G"]:
+    owner, agent = visual_of(scene, looks).owner, scene.tables.body_agent[scene.model.geom_bodyid]
+    agent = np.pad(agent, (0, len(owner) - len(agent)), constant_values=-1)
     found = np.full(len(owner), other, np.int32)
     found[owner >= 0] = of_objects[owner[owner >= 0]]
     found[agent >= 0] = [of_agent(int(a)) for a in agent[agent >= 0]]

@@ -18,7 +18,7 @@ def _segmentation(
     name: str,
     summary: str,
     numbers: int,
-    of_geoms: Callable[[Scene], np.ndarray],
+    of_geoms: Callable[[Scene, str], np.ndarray],
     of_slots: Callable[[Slots], Array],
 ) -> Sensor:
     def space(setup: Setup) -> Space:
@@ -27,7 +27,8 @@ def _segmentation(
     def read(setup: Setup, percept: Percept) -> Int[Array, "W Y X 1"]:
         images = percept.images
         assert images is not None and images.geom is not None and images.slots is not None
-        seen = labels.looked_up(images.geom[:, 0], of_geoms(setup.scene), of_slots(images.slots), labels.BACKGROUND)
+        known = of_geoms(setup.scene, setup.options.looks)
+        seen = labels.looked_up(images.geom[:, 0], known, of_slots(images.slots), labels.BACKGROUND)
         return seen[..., None]
 
     return Sensor(name, summary, "", space, read, frozenset({"segmentation"}))
