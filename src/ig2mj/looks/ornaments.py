@@ -16,6 +16,10 @@ from ig2mj.looks.materials import Material, fabric
 from ig2mj.looks.mesh import Builder, Colour, Triangles
 
 LEAVES: tuple[Colour, ...] = GREENS
+POTS: tuple[Colour, ...] = ((0.78, 0.45, 0.32), (0.92, 0.91, 0.88), (0.35, 0.42, 0.46), (0.82, 0.73, 0.58))
+CLOTHES: tuple[Colour, ...] = (
+    (0.28, 0.34, 0.45), (0.62, 0.30, 0.28), (0.80, 0.74, 0.62), (0.34, 0.44, 0.36), (0.85, 0.68, 0.40),
+)  # fmt: skip
 WOODS: tuple[Colour, ...] = ((0.66, 0.48, 0.31), (0.45, 0.31, 0.21), (0.80, 0.66, 0.47))
 STEEL, BLACK, LINEN = (0.74, 0.75, 0.76), (0.16, 0.16, 0.17), (0.93, 0.89, 0.80)
 
