@@ -219,3 +219,10 @@ def test_bad_input_is_one_line_and_exit_2(tiny_home_folder, arguments, telling, 
     assert call([str(tiny_home_folder) if a == "HOME" else a for a in arguments]) == 2
     said = capsys.readouterr().err
     assert telling in said and said.count("\n") == 1
+
+
+def test_large_things_are_put_into_a_container_before_small_ones(sampler, start):
+    steps = steps_of(sampler, start, "(and (inside knife cabinet) (inside box cabinet) (inside ball cabinet))")
+    placed = [s.split()[1] for s in steps if s.startswith("place_inside")]
+    volumes = [Domain(sampler.model).volume(name) for name in placed]
+    assert len(placed) == 3 and volumes == sorted(volumes, reverse=True)

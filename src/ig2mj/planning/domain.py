@@ -56,6 +56,11 @@ class Domain:
         """Whether an object is a part of the house."""
         return bool(self.model.tables.object_fixed[self.index(name)])
 
+    def volume(self, name: str) -> float:
+        """Cubic metres of an object's box as it is modelled; of a room, 0."""
+        tables = self.model.tables
+        return float(np.prod(tables.object_bbox[self.index(name)])) if name in tables.object_names else 0.0
+
     def opens(self, name: str) -> bool:
         """Whether an object has joints that count for `open`."""
         return name in self._openable

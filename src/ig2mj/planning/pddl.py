@@ -11,7 +11,8 @@ import pathlib
 from collections.abc import Iterable, Sequence
 
 from ig2mj.planning.facts import Facts
-from ig2mj.planning.task_planner import PLACE, TaskPlan
+from ig2mj.planning.steps import PLACE
+from ig2mj.planning.task_planner import TaskPlan
 from ig2mj.predicates.logic import Atom
 from ig2mj.sampling.conditions import Condition
 

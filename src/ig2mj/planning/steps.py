@@ -98,6 +98,17 @@ _PRIMITIVES = (
 
 PRIMITIVES: dict[str, Primitive] = {p.name: p for p in _PRIMITIVES}
 
+PLACE = {
+    "inside": "place_inside",
+    "on_top": "place_on_top",
+    "under": "place_under",
+    "next_to": "place_next_to",
+    "in_contact_with": "push",
+    "on_floor": "place_on_floor",
+}
+"""Primitive that makes a placement true; of several conditions on one object the first of this order is the rule, the
+others are checked."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Step:

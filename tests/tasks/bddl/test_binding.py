@@ -205,3 +205,11 @@ def test_conditions_of_the_start_speak_of_rooms_and_leave_absent_agents_out(wind
     with_agent = bind(load_activity("cleaning_windows"), load_manifest(SHIPPED_HOMES / "small_home"), ["robot"])
     assert not conditions(with_agent).left_out
     assert any(logic.text(c) == "(on_floor robot kitchen_0)" for c in conditions(with_agent).init)
+
+
+def test_a_tool_that_the_goal_takes_and_the_home_lacks_is_added_and_lies_on_a_floor_with_water():
+    meal = load_activity("cleaning_up_after_a_meal")
+    bound = bind(meal, load_manifest(SHIPPED_HOMES / "linden"))
+    assert bound.tools == {"rag_0": "kitchen_0"}
+    assert bound.additions[-1] == "rag/rag_00" and "rag_0" not in bound.objects.values()
+    assert bind(meal, load_manifest(SHIPPED_HOMES / "maple")).tools == {}, "maple has a tool"

@@ -5,6 +5,9 @@ room if that is possible, and whatever a condition of the start relates is in on
 for all of a kind). Every other object is one of the home's that no other has taken, else one of the object library; so
 is one with `inroom` of which the room has too few, where it is not a furniture that is fixed. All choices are the first
 possible in the home's order: the same home, the same binding.
+
+A goal that wants something cleaned or cut may be bound where nothing cleans or cuts, since definitions do not always
+name the tool: one of the library is added, on the floor of a room with water.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from ig2mj.errors import Ig2mjError
 from ig2mj.knowledge import synset
-from ig2mj.predicates import find
+from ig2mj.predicates import find, logic
 from ig2mj.predicates.logic import Atom
 from ig2mj.scene.additions import name_additions
 from ig2mj.scene.library import LibraryModel, library
@@ -22,6 +25,12 @@ from ig2mj.scene.manifest import Manifest, ObjectEntry
 from ig2mj.tasks.bddl.matching import clusters_of, match, search_rooms
 from ig2mj.tasks.bddl.synsets import AGENT, Kinds, kinds
 from ig2mj.tasks.bddl.vocabulary import Activity
+
+TOOLS = (
+    (frozenset(("dusty", "stained")), "cleaningTool", "rag/rag_00"),
+    (frozenset(("sliced",)), "slicer", "carving_knife/carving_knife_00"),
+)
+"""Predicates of a goal, the ability of the tool that they take, and the model that is added where the home has none."""
 
 
 class BindingError(Ig2mjError):
@@ -43,6 +52,7 @@ class Binding:
       additions: what `load_scene(home, objects=...)` must add. added: the names that these get, in that order.
       agents: object of the activity -> agent of the scene.
       stand_ins: synset -> what stands in for it, where our taxonomy does not know it.
+      tools: names of added tools that the activity does not name, and the room on whose floor each lies.
     """
 
     activity: Activity
@@ -53,6 +63,7 @@ class Binding:
     added: tuple[str, ...]
     agents: Mapping[str, str]
     stand_ins: Mapping[str, str]
+    tools: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
 
 def bind(activity: Activity, manifest: Manifest, agents: Sequence[str] = ()) -> Binding:
@@ -114,9 +125,10 @@ class _Binder:
         self.bind_rest()
         if self.reasons:
             raise BindingError(self.activity.name, self.manifest.name, self.reasons)
-        wanted = [f"{m.category}/{m.model}" for m in self.added.values()]
+        tools = self.lacking_tools()
+        wanted = [*(f"{m.category}/{m.model}" for m in self.added.values()), *tools]
         named = name_additions((o.name for o in self.manifest.objects), wanted)
-        self.objects |= {name: new for name, (new, _) in zip(self.added, named, strict=True)}
+        self.objects |= {name: new for name, (new, _) in zip(self.added, named, strict=False)}
         for half, (whole, number) in self.activity.halves.items():
             self.objects[half] = self.half_of(whole, number)
         order = [*self.synset, *self.activity.halves]
@@ -130,7 +142,21 @@ class _Binder:
             added=tuple(new for new, _ in named),
             agents=dict(zip(mine, agents, strict=False)),
             stand_ins={s: k.instead for s, k in self.kinds.items() if k.instead is not None},
+            tools={name: self.wet_room() for name, _ in named[len(self.added) :]},
         )
+
+    def lacking_tools(self) -> list[str]:
+        """Models of tools that the goal takes, and that neither the home nor what is added to it has."""
+        goal = logic.ground(logic.And(self.activity.goal), self.activity.objects.__getitem__)
+        asked = {a.predicate for a in logic.atoms(goal)}
+        loose = [o for o in self.entries.values() if not o.fixed and not o.parked]
+        there = {ability for o in [*loose, *(m.entry for m in self.added.values())] for ability in o.abilities}
+        return [model for predicates, ability, model in TOOLS if asked & predicates and ability not in there]
+
+    def wet_room(self) -> str:
+        """A room with water, if there is one."""
+        wet = [room for o in self.entries.values() if "water_source" in o.links for room in o.rooms]
+        return next(iter([*wet, *self.rooms.values(), *self.manifest.rooms.instances]), "")
 
     def bind_rooms(self, kind: str, names: list[str]) -> None:
         """Binds the objects that have to be in rooms of one kind."""

@@ -60,7 +60,7 @@ class RowStatus:
 
 
 def fitting(activity: Activity, homes: Sequence[Manifest]) -> tuple[list[Binding], dict[str, list[str]]]:
-    """Bindings in the homes that fit, those that add least first, and of the other homes the reasons."""
+    """Bindings in the homes that fit, those that add least (tools left out) first; of the other homes the reasons."""
     bound: list[Binding] = []
     errors: dict[str, list[str]] = {}
     for manifest in homes:
@@ -68,7 +68,7 @@ def fitting(activity: Activity, homes: Sequence[Manifest]) -> tuple[list[Binding
             bound.append(bind(activity, manifest))
         except BindingError as e:
             errors[manifest.name] = list(e.reasons)
-    return sorted(bound, key=lambda b: len(b.additions)), errors
+    return sorted(bound, key=lambda b: len(b.additions) - len(b.tools)), errors
 
 
 def start_conditions(binding: Binding, scene: Scene) -> list[Condition]:
@@ -92,6 +92,7 @@ def start_conditions(binding: Binding, scene: Scene) -> list[Condition]:
     wanted = [
         (binding.objects[name], room) for name, room in binding.rooms.items() if binding.objects[name] in binding.added
     ]
+    wanted += [(tool, room or scene.object_names[0]) for tool, room in binding.tools.items()]
     return [*found, *(Condition("on_floor", (new, room)) for new, room in wanted if new not in placed)]
 
 

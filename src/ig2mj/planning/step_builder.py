@@ -1,0 +1,300 @@
+"""`StepBuilder`: the steps that make the literals of a reading true in one world, with what they need first.
+
+What shuts an object in is opened, a tap runs before a tool is soaked, a tool is soaked before it scrubs, a knife is
+taken before it cuts, hands that are full put something down. Steps that failed choose another tool, tap or support.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ig2mj.planning.domain import SYMMETRIC
+from ig2mj.planning.facts import Facts
+from ig2mj.planning.step_order import LATER, ordered
+from ig2mj.planning.steps import PLACE, Step
+from ig2mj.sampling.conditions import Condition
+
+
+class StepBuilder:
+    """Collects steps over a light symbolic state, which the steps change as they are added."""
+
+    def __init__(
+        self,
+        facts: Facts,
+        wanted: Sequence[Condition],
+        missing: Sequence[Condition],
+        failed: Mapping[Condition, int],
+    ):
+        self._facts, self._domain, self._failed = facts, facts.domain, failed
+        self._wanted = wanted
+        self.steps: list[Step] = []
+        self._held = list(facts.held)
+        self._open: dict[str, bool] = {}
+        self._on: dict[str, bool] = {}
+        self._wet: set[str] = set()
+        self._inside: dict[str, tuple[str, ...]] = {}
+        for condition in ordered(missing, failed, self._held, self._tool, self._domain):
+            self._serves = condition
+            self._make(condition)
+        for condition in wanted:  # what the steps themselves made false
+            self._serves = condition
+            if condition.predicate == "open" and condition.arguments[0] in self._open:
+                self._set_open(condition.arguments[0], condition.value)
+            if condition.predicate == "toggled_on" and condition.arguments[0] in self._on:
+                self._switch(condition.arguments[0], condition.value)
+
+    def _add(self, primitive: str, *arguments: str, also: tuple[Condition, ...] = ()) -> None:
+        self.steps.append(Step(primitive, arguments, also, self._serves))
+
+    def _make(self, c: Condition) -> None:
+        name = c.arguments[0]
+        if c.predicate in PLACE:
+            self._move(c)
+        elif c.predicate == "open":
+            self._set_open(name, c.value)
+        elif c.predicate == "toggled_on":
+            self._switch(name, c.value)
+        elif c.predicate == "soaked":
+            for part in self._parts(name, c):
+                self._soak(part)
+        elif c.predicate == "cooked":
+            for part in self._parts(name, c):
+                self._cook(part)
+        elif c.predicate == "frozen":
+            for part in self._parts(name, c):
+                self._freeze(part)
+        elif c.predicate == "sliced":
+            knife = self._tool(c)
+            self._reach(name)
+            self._take(knife)
+            self._add("slice", name, knife)
+        else:
+            tool = self._tool(c)
+            for part in self._parts(name, c):
+                self._reach(part)
+            if c.predicate == "stained" and not self._soaked(tool):
+                self._soak(tool)
+            self._take(tool)
+            for part in self._parts(name, c):
+                self._add("scrub" if c.predicate == "stained" else "wipe", part, tool)
+
+    def _parts(self, name: str, c: Condition) -> tuple[str, ...]:
+        """The object of a condition, or of its halves, where it has been cut, those of which it is false."""
+        if not self._facts.sliced(name):
+            return (name,)
+        own = {h: tuple(h if a == name else a for a in c.arguments) for h in self._domain.halves(name)}
+        return tuple(h for h, arguments in own.items() if self._facts.holds(c.predicate, *arguments) != c.value)
+
+    def _tool(self, c: Condition) -> str:
+        """What cleans or cuts: one in a hand first, then a soaked one for stains, then one that is not shut in; after
+        failures the next."""
+        knife = c.predicate == "sliced"
+        tools = [t for t in (self._domain.knives if knife else self._domain.tools) if t != c.arguments[0]]
+        if c.predicate == "stained":
+            tools = [t for t in tools if self._domain.has(t, "soakable") or self._facts.holds("soaked", t)]
+        named = {a for w in self._wanted for a in w.arguments}
+
+        def rank(tool: str) -> tuple:
+            return (
+                tool not in self._held,
+                c.predicate == "stained" and not self._soaked(tool),
+                bool(self._shut_in(tool)),
+                tool not in named,
+                tools.index(tool),
+            )
+
+        return sorted(tools, key=rank)[self._failed.get(c, 0) // 2 % len(tools)]
+
+    def _soaked(self, name: str) -> bool:
+        return name in self._wet or self._facts.holds("soaked", name)
+
+    def _is_open(self, name: str) -> bool:
+        return self._open[name] if name in self._open else self._facts.holds("open", name)
+
+    def _is_on(self, name: str) -> bool:
+        return self._on[name] if name in self._on else self._facts.holds("toggled_on", name)
+
+    def _shut_in(self, name: str) -> list[str]:
+        """Closed containers around an object."""
+        if name in self._held:
+            return []
+        around = self._inside[name] if name in self._inside else self._facts.containers(name)
+        return [c for c in around if self._domain.opens(c) and not self._is_open(c)]
+
+    def _reach(self, name: str) -> None:
+        """Opens what shuts an object in."""
+        for container in self._shut_in(name):
+            self._set_open(container, True)
+
+    def _set_open(self, name: str, value: bool) -> None:
+        if self._is_open(name) == value:
+            return
+        self._free_hand()
+        self._add("open" if value else "close", name)
+        self._open[name] = value
+
+    def _switch(self, name: str, value: bool) -> None:
+        if self._is_on(name) == value or not self._domain.has(name, "toggleable"):
+            return
+        self._reach(name)
+        self._add("toggle_on" if value else "toggle_off", name)
+        self._on[name] = value
+
+    def _free_hand(self, keep: str = "") -> None:
+        """Puts down what is held longest, where all hands are full."""
+        if len(self._held) < self._domain.hands:
+            return
+        name = next((n for n in self._held if n != keep), "")
+        if name:
+            self._add("release", name)
+            self._held.remove(name)
+
+    def _take(self, name: str) -> None:
+        if name in self._held:
+            return
+        self._reach(name)
+        self._free_hand()
+        self._add("grasp", name)
+        self._held.append(name)
+        self._inside[name] = ()
+
+    def _put(self, primitive: str, name: str, where: str, also: tuple[Condition, ...] = ()) -> None:
+        self._add(primitive, name, where, also=also)
+        if name in self._held:
+            self._held.remove(name)
+        if primitive == "place_inside":
+            self._inside[name] = (where, *(self._inside.get(where) or ()))
+
+    def _soak(self, name: str) -> None:
+        tap = self._nearest(self._domain.taps, name)
+        self._switch(tap, True)
+        self._take(name)
+        self._add("soak", name, tap)
+        self._wet.add(name)
+
+    def _cook(self, name: str) -> None:
+        choices = self._domain.heaters(name)
+        source = choices[self._failed.get(self._serves, 0) // 2 % len(choices)]
+        was_on = self._is_on(source.name) if source.needs_switch else True
+        if source.acts_inside:
+            self._put_in(name, source.name, source.needs_closed)
+        if source.needs_switch:
+            self._switch(source.name, True)
+        if not source.acts_inside:
+            self._take(name)
+        self._add("cook", name, source.name)
+        if not was_on:
+            self._switch(source.name, False)
+
+    def _freeze(self, name: str) -> None:
+        choices = self._domain.coolers(name)
+        source = choices[self._failed.get(self._serves, 0) // 2 % len(choices)]
+        self._put_in(name, source.name, source.needs_closed)
+        if source.needs_switch:
+            self._switch(source.name, True)
+        self._add("freeze", name, source.name)
+
+    def _put_in(self, name: str, container: str, close: bool) -> None:
+        """Puts an object into a container and shuts it."""
+        if not self._facts.holds("inside", name, container) or name in self._held:
+            self._reach(name)
+            if self._domain.opens(container):
+                self._set_open(container, True)
+            self._take(name)
+            self._put("place_inside", name, container)
+        if close and self._domain.opens(container):
+            self._set_open(container, False)
+
+    def _move(self, c: Condition) -> None:
+        """Makes a placement true, or false. Conditions on the same object are made true together."""
+        mover = self._domain.mover(c)
+        if c.value and c.predicate in SYMMETRIC and self._failed.get(c, 0) % 2:  # after a failure, the other object
+            mover = next((a for a in c.arguments if a != mover and not self._domain.fixed(a)), mover)
+        for name in self._parts(mover, c):
+            if not c.value:
+                if not self._moved(name):
+                    self._away(name, c)
+                continue
+            rules = self._rules(mover, name, c)
+            rule = rules[0]
+            if any(s.primitive == PLACE[rule.predicate] and s.arguments == rule.arguments for s in self.steps):
+                continue
+            target = rule.arguments[1]
+            self._reach(name)
+            if rule.predicate == "inside" and self._domain.opens(target):
+                self._set_open(target, True)
+            elif rule.predicate != "on_floor" and rule.predicate != "on_top":
+                self._reach(target)
+            if rule.predicate == "in_contact_with":
+                self._free_hand()
+                self._put("push", name, target, rules[1:])
+                continue
+            crowding = self._crowding(rule, c)
+            if crowding is not None:
+                self._take(crowding.arguments[0])
+            self._take(name)
+            self._put(PLACE[rule.predicate], name, target, rules[1:])
+            if crowding is not None:
+                self._serves = crowding
+                self._put(PLACE[crowding.predicate], crowding.arguments[0], target)
+                self._serves = c
+
+    def _crowding(self, rule: Condition, c: Condition) -> Condition | None:
+        """After failures of a placement, one of the things that are there already: it is taken out first and put back
+        last, so that the room is divided in another way. Needs two hands."""
+        count = self._failed.get(c, 0)
+        if count < LATER or self._domain.hands < 2 or rule.predicate not in ("inside", "on_top"):
+            return None
+        there = [
+            w
+            for w in self._wanted
+            if (w.predicate, w.arguments[1:], w.value) == (rule.predicate, rule.arguments[1:], True)
+            and w.arguments[0] != rule.arguments[0]
+            and w.arguments[0] not in self._held
+            and not self._domain.fixed(w.arguments[0])
+            and self._true(w)
+        ]
+        return there[count % len(there)] if there else None
+
+    def _rules(self, mover: str, name: str, c: Condition) -> tuple[Condition, ...]:
+        """The conditions that the reading puts on an object, the rule first; `name` stands for the one that moves.
+
+        Of relations to objects that are still to be moved nothing is asked yet.
+        """
+        moved = {s.arguments[0] for s in self.steps if s.primitive in PLACE.values()}
+        later = {w.arguments[0] for w in self._wanted if w.value and w.predicate in PLACE and not self._true(w)} - moved
+        found = [c] if c.arguments[0] == mover else [dataclasses.replace(c, arguments=(mover, c.arguments[0]))]
+        for w in self._wanted:
+            if w.predicate in PLACE and w.value and w.arguments[0] == mover and w != c and w.arguments[1] not in later:
+                found.append(w)
+        ordered = sorted(found, key=lambda w: list(PLACE).index(w.predicate))
+        return tuple(dataclasses.replace(w, arguments=(name, *w.arguments[1:])) for w in ordered)
+
+    def _true(self, c: Condition) -> bool:
+        return self._facts.holds(c.predicate, *c.arguments) == c.value
+
+    def _moved(self, name: str) -> bool:
+        """Whether the plan places the object anyway, or will."""
+        placed = any(s.primitive in PLACE.values() and s.arguments[0] == name for s in self.steps)
+        return placed or any(
+            w.predicate in PLACE and w.value and w.arguments[0] == name and not self._true(w) for w in self._wanted
+        )
+
+    def _away(self, name: str, c: Condition) -> None:
+        """Takes an object away from where it must not be."""
+        self._reach(name)
+        self._take(name)
+        gone, count = dataclasses.replace(c, arguments=(name, *c.arguments[1:])), self._failed.get(c, 0)
+        supports = [s for s in self._domain.supports if s != c.arguments[1]]
+        if supports and (c.predicate == "on_floor" or count % 2):
+            near = sorted(supports, key=lambda s: float(np.linalg.norm(self._facts.place(s) - self._facts.place(name))))
+            self._put("place_on_top", name, near[count // 2 % len(near)], (gone,))
+        else:
+            self._put("place_on_floor", name, self._facts.room(name), (gone,))
+
+    def _nearest(self, names: Sequence[str], to: str) -> str:
+        near = sorted(names, key=lambda n: float(np.linalg.norm(self._facts.place(n) - self._facts.place(to))))
+        return near[self._failed.get(self._serves, 0) // 2 % len(near)]

@@ -1,0 +1,75 @@
+"""In which order the literals of a reading are made true: what depends on what comes first.
+
+1. what is opened for its own sake; what is cut, cleaned, soaked and cooked, where it stands;
+2. what is taken away, then what is placed: supports before what they bear, large things before small ones;
+3. what is frozen;
+4. what is switched and shut.
+
+What a hand holds already comes before, and what has failed several times comes last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+from ig2mj.planning.domain import Domain
+from ig2mj.planning.steps import PLACE
+from ig2mj.sampling.conditions import Condition
+
+LATER, GIVE_UP = 2, 6
+"""Failures of a condition after which the others come first, and after which no step is planned for it."""
+
+FIRST = ("sliced", "dusty", "stained", "soaked", "cooked")
+"""Predicates that come before placements, in this order."""
+
+
+def ordered(
+    missing: Sequence[Condition],
+    failed: Mapping[Condition, int],
+    held: Collection[str],
+    tool: Callable[[Condition], str],
+    domain: Domain,
+) -> list[Condition]:
+    """Conditions in the order in which they are made true, without those that failed `GIVE_UP` times.
+
+    Args:
+      missing: conditions that are false. failed: how often steps of a condition failed. held: what hands hold.
+      tool: what cleans or cuts for a condition.
+    """
+    targets = list(dict.fromkeys(c.arguments[-1] for c in missing))
+    first = sorted((c for c in missing if c.predicate in FIRST), key=lambda c: FIRST.index(c.predicate))
+    places = [c for c in missing if c.predicate in PLACE]
+    places.sort(key=lambda c: (failed.get(c, 0), targets.index(c.arguments[-1]), -domain.volume(c.arguments[0])))
+    away = [c for c in places if not c.value]
+    down = supports_first([c for c in places if c.value])
+    frozen = [c for c in missing if c.predicate == "frozen"]
+    opens = [c for c in missing if c.predicate == "open" and c.value]
+    switches = [c for c in missing if c.predicate == "toggled_on"]
+    shut = [c for c in missing if c.predicate == "open" and not c.value]
+    order = [*opens, *first, *away, *down, *frozen, *switches, *shut]
+    in_hand = [c for c in order if c.arguments[0] in held and c.predicate in (*PLACE, *FIRST)]
+    tools = [c for c in order if c.predicate in ("dusty", "stained", "sliced") and tool(c) in held]
+    order = list(dict.fromkeys([*tools, *in_hand, *order]))
+    tried = [c for c in order if failed.get(c, 0) < GIVE_UP]
+    return sorted(tried, key=lambda c: failed.get(c, 0) >= LATER)
+
+
+def supports_first(places: Sequence[Condition]) -> list[Condition]:
+    """Placements, what bears before what it bears, else in the given order."""
+    import networkx  # 90 ms that importing ig2mj.Simulation does not spend
+
+    graph = networkx.DiGraph()
+    graph.add_nodes_from(dict.fromkeys(c.arguments[0] for c in places))
+    for c in places:
+        if c.arguments[-1] in graph and c.predicate != "next_to":
+            graph.add_edge(c.arguments[-1], c.arguments[0])
+    for c in places:  # neighbours come after their partners, where nothing says otherwise
+        a, b = c.arguments
+        if c.predicate == "next_to" and b in graph and not networkx.has_path(graph, a, b):
+            graph.add_edge(b, a)
+    given = {name: k for k, name in enumerate(graph)}
+    try:
+        names = list(networkx.lexicographical_topological_sort(graph, key=given.__getitem__))
+    except networkx.NetworkXUnfeasible:
+        names = list(graph)
+    return sorted(places, key=lambda c: names.index(c.arguments[0]))
