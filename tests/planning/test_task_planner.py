@@ -128,7 +128,9 @@ def test_failures_choose_another_object(sampler, start):
         ("(frozen apple)", "(frozen apple) is false, and nothing in the scene is cold enough for 'apple'"),
         ("(dusty book)", "(dusty book) is false, and no primitive makes 'book' dusty"),
         ("(cooked ball)", "(cooked ball) is false, and 'ball' is not cookable"),
-        ("(and (open cabinet) (not (open cabinet)))", "contradict each other"),
+        ("(and (open cabinet) (not (open cabinet)))", "(open cabinet) would have to be both true and false"),
+        ("(and (inside ball cabinet) (on_top ball stove))", "(on_top ball stove) cannot be true together"),
+        ("(and (inside ball pan) (on_top pan ball))", "(on_top pan ball) cannot be true together"),
     ],
 )
 @pytest.mark.filterwarnings("ignore::ig2mj.predicates.AbilityWarning")

@@ -61,6 +61,10 @@ class Domain:
         tables = self.model.tables
         return float(np.prod(tables.object_bbox[self.index(name)])) if name in tables.object_names else 0.0
 
+    def length(self, name: str) -> float:
+        """Metres from corner to corner of an object's box as it is modelled."""
+        return float(np.linalg.norm(self.model.tables.object_bbox[self.index(name)]))
+
     def opens(self, name: str) -> bool:
         """Whether an object has joints that count for `open`."""
         return name in self._openable

@@ -12,15 +12,17 @@ another object of an `exists`, another tool or another support is taken.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping
 
 from ig2mj.planning.domain import Domain, condition_of
+from ig2mj.planning.exclusion import incompatible
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.step_builder import StepBuilder
 from ig2mj.planning.steps import PlanningError, Step
 from ig2mj.predicates import logic
-from ig2mj.predicates.cheapest import cheapest
+from ig2mj.predicates.cheapest import Cost, Incompatible, cheapest, contradiction
 from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.predicates.logic import Atom
 from ig2mj.sampling.conditions import Condition
@@ -94,9 +96,10 @@ class TaskPlanner:
             steps = STEPS_OF.get(condition.predicate, PLACING)
             return steps + FAILED * min(failed.get(condition, 0), REMEMBERED)
 
-        value, reading = cheapest(self.goal.ground, cost)
+        together = functools.partial(incompatible, facts)
+        value, reading = cheapest(self.goal.ground, cost, incompatible=together)
         if math.isinf(value):
-            raise PlanningError(self._why_not(truth))
+            raise PlanningError(f"the goal cannot become true: {self._why_not(truth, cost, together)}")
         wanted = tuple(condition_of(atom, wanted) for atom, wanted in reading.items())
         missing = tuple(condition_of(atom, wanted) for atom, wanted in reading.items() if truth[atom] != wanted)
         return TaskPlan(tuple(StepBuilder(facts, wanted, missing, failed).steps), missing, wanted)
@@ -106,16 +109,20 @@ class TaskPlanner:
             self._impossible[condition] = self.domain.impossible(condition)
         return self._impossible[condition]
 
-    def _why_not(self, truth: Mapping[Atom, bool]) -> str:
-        """The first literal whose impossibility keeps the goal from becoming true."""
+    def _why_not(self, truth: Mapping[Atom, bool], cost: Cost, together: Incompatible) -> str:
+        """The first literal whose impossibility keeps the goal from becoming true, or literals that exclude each
+        other."""
 
         def barred(atom: Atom, wanted: bool) -> bool:
             return truth[atom] != wanted and bool(self._reason(condition_of(atom, wanted)))
 
         value, reading = cheapest(self.goal.ground, lambda atom, wanted: float(barred(atom, wanted)))
-        if not math.isinf(value):
-            for atom, wanted in reading.items():
-                if barred(atom, wanted):
-                    condition = condition_of(atom, wanted)
-                    return f"the goal cannot become true: {condition} is false, and {self._reason(condition)}"
-        return f"the goal cannot become true: its literals contradict each other in {logic.text(self.goal.source)}"
+        for atom, wanted in reading.items():
+            if not math.isinf(value) and barred(atom, wanted):
+                condition = condition_of(atom, wanted)
+                return f"{condition} is false, and {self._reason(condition)}"
+        if (atom := contradiction(self.goal.ground, cost)) is not None:
+            return f"{logic.text(atom)} would have to be both true and false"
+        if excluding := together(reading):
+            return f"{' and '.join(map(logic.text, excluding))} cannot be true together"
+        return f"its literals contradict each other in {logic.text(self.goal.source)}"

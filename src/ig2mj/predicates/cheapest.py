@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,28 +40,47 @@ class _Choice(NamedTuple):
 NOTHING = _Choice(math.inf, {})
 
 
-def cheapest(expression: Expression, cost: Cost, wanted: bool = True) -> tuple[float, Reading]:
+Incompatible = Callable[[Reading], Collection[Atom]]
+"""Atoms of a reading that cannot have their truth together; none: there are none."""
+
+
+def compatible(reading: Reading) -> Collection[Atom]:
+    """An `Incompatible` to which everything can be together."""
+    return ()
+
+
+def cheapest(
+    expression: Expression, cost: Cost, wanted: bool = True, incompatible: Incompatible = compatible
+) -> tuple[float, Reading]:
     """The reading of least cost, and that cost; infinite, with the reading of what fits, where there is none.
 
     Args:
       expression: ground. cost: of literals; may be negative. Each use of a literal counts.
+      incompatible: what cannot be together, though each can be.
     """
     first = _choice(expression, cost, wanted)
-    if first.clash is None:
-        return first.cost, first.reading
     numbers = itertools.count()
     queue: list[tuple[float, int, dict[Atom, bool], _Choice]] = [(first.cost, next(numbers), {}, first)]
     for _ in range(BRANCHES):
         if not queue or math.isinf(queue[0][0]):
             break
         value, _, settled, found = heapq.heappop(queue)
-        if found.clash is None:
-            return value, found.reading
-        for truth in (True, False):
-            own = {**settled, found.clash: truth}
+        if found.clash is not None:
+            branches = [{found.clash: True}, {found.clash: False}]
+        else:
+            branches = [{atom: not found.reading[atom]} for atom in incompatible(found.reading)]
+            if not branches:
+                return value, found.reading
+        for branch in branches:
+            own = {**settled, **branch}
             choice = _choice(expression, _given(cost, own), wanted)
             heapq.heappush(queue, (choice.cost, next(numbers), own, choice))
     return math.inf, first.reading
+
+
+def contradiction(expression: Expression, cost: Cost) -> Atom | None:
+    """An atom that the reading of least cost wants both true and false."""
+    return _choice(expression, cost, True).clash
 
 
 def _given(cost: Cost, settled: Reading) -> Cost:
