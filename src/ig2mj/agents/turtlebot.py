@@ -35,7 +35,9 @@ from ig2mj.agents.parts import (
     visual,
 )
 from ig2mj.agents.task_robot import TaskRobot
+from ig2mj.agents.turtlebot_costume import costume
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.looks.costume import Costume
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
 
@@ -109,6 +111,10 @@ class TurtleBot(TaskRobot):
 
     def hand_rays(self) -> tuple[HandRays, ...]:
         return ()
+
+    def costume(self) -> Costume:
+        """What people see of it: see `ig2mj.agents.turtlebot_costume`."""
+        return costume(self.name, PLATES)
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> TurtleBotController:
         return TurtleBotController(agent, tables, self.discrete)

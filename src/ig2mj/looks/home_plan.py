@@ -23,6 +23,9 @@ OUT, STEP, REVEAL = 0.12, 0.05, 0.26
 """m: how far before a face its room is looked up, and how densely along it; narrower faces are those of openings."""
 
 
+SLIVER = 0.16
+"""m: stretches of no room that are shorter belong to the room next to them."""
+
 OFF_GRID = 0.000237
 """m added before coordinates are compared by millimetres: those of plans are multiples of half of one."""
 
@@ -219,7 +222,7 @@ def _by_room(rectangle: Rectangle, rooms: Rooms) -> list[Face]:
     edges = np.linspace(start, end, steps + 1)
     points = np.zeros((steps, 2))
     points[:, axis], points[:, other] = low[axis] + sign * OUT, (edges[1:] + edges[:-1]) / 2
-    index = rooms.index_at(points)
+    index = _without_slivers(rooms.index_at(points), (end - start) / steps)
     pieces, first = [], 0
     for k in range(1, steps + 1):
         if k == steps or index[k] != index[first]:
@@ -238,6 +241,20 @@ def _by_room(rectangle: Rectangle, rooms: Rooms) -> list[Face]:
             )
             first = k
     return pieces
+
+
+def _without_slivers(index: np.ndarray, step: float | int) -> np.ndarray:
+    """Rooms along a wall, in which short stretches of no room belong to the room next to them: maps are coarser than
+    walls are."""
+    index = index.copy()
+    first = 0
+    for k in range(1, len(index) + 1):
+        if k == len(index) or index[k] != index[first]:
+            if index[first] < 0 and (k - first) * step < SLIVER:
+                near = index[first - 1] if first > 0 else index[k] if k < len(index) else -1
+                index[first:k] = near
+            first = k
+    return index
 
 
 def _room(scene: Scene, rooms: Rooms, name: str, kind: str) -> Room:

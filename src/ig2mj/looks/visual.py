@@ -5,6 +5,7 @@ Axes: G geoms of the scene, E geoms that are added.
 
 from __future__ import annotations
 
+import dataclasses
 import weakref
 
 import mujoco
@@ -12,6 +13,7 @@ import numpy as np
 from jaxtyping import Int
 
 from ig2mj.errors import EngineError
+from ig2mj.looks.costume import Followers, costumes_of, names_of
 from ig2mj.looks.furnishing import add_furnishing
 from ig2mj.looks.home_plan import read_plan
 from ig2mj.looks.interior import TRIM, add_interior
@@ -19,10 +21,14 @@ from ig2mj.looks.light import DAY, NIGHT, Light, set_light
 from ig2mj.looks.materials import Material
 from ig2mj.looks.mesh import Builder, Triangles
 from ig2mj.looks.outside import add_outside
+from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN, Scene, check_looks
 
 DECOR = "ig2mj/decoration"
 """Name of the body that has all decoration of a home."""
+
+COSTUMES = "ig2mj/costumes"
+"""Name of the body that has what robots wear. Its geoms are drawn on the robots' bodies."""
 
 FARTHEST = 120.0
 """m that is seen: beyond the sky of a home."""
@@ -62,6 +68,7 @@ class Visual:
         self.light: Light | None = LIGHTS.get(looks)
         self.model = scene.model if looks == PLAIN else _compiled(scene, looks)
         self._base = self.model.geom_rgba.copy(), self.model.geom_matid.copy()
+        self.followers = Followers(scene, self.model)
         owners = visual_owners(scene, self.model, self.model.ngeom)
         self.owner: Int[np.ndarray, "G"] = np.concatenate([scene.tables.geom_object, owners])
         self._data: mujoco.MjData | None = None
@@ -82,6 +89,10 @@ class Visual:
             of_world = getattr(data, name)
             getattr(mine, name)[: len(of_world)] = of_world
         mine.geom_xpos[: model.ngeom], mine.geom_xmat[: model.ngeom] = data.geom_xpos, data.geom_xmat
+        if len(self.followers):
+            pos, axes = self.followers.poses(data.xpos[None], data.xmat.reshape(1, -1, 3, 3))
+            mine.geom_xpos[self.followers.geoms] = pos[0]
+            mine.geom_xmat[self.followers.geoms] = axes[0].reshape(-1, 9)
         (rgba, material), (base_rgba, base_material) = self._plain, self._base
         changed = np.flatnonzero((model.geom_rgba != rgba).any(axis=1) | (model.geom_matid != material))
         self.model.geom_rgba[:], self.model.geom_matid[:] = base_rgba, base_material
@@ -110,6 +121,7 @@ def decorate(spec: mujoco.MjSpec, scene: Scene, looks: str) -> None:
         return
     light = LIGHTS[looks]
     set_light(spec, light)
+    _dress(spec, scene)
     build, plan = Builder(), read_plan(scene)
     if plan is None:
         return
@@ -123,6 +135,25 @@ def decorate(spec: mujoco.MjSpec, scene: Scene, looks: str) -> None:
         if entry.category == "walls":
             for geom in (g for name in entry.bodies for g in spec.body(name).geoms if g.group == 0 and not g.material):
                 geom.rgba = [*TRIM, 1.0]
+
+
+def _dress(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Adds the costumes of robots; where their parts are is `Followers`' to say."""
+    costumes = costumes_of(scene)
+    if not costumes:
+        return
+    body = spec.worldbody.add_body(name=COSTUMES)
+    for number, costume in enumerate(costumes):
+        parts = [(names_of("on", number, name), build) for name, build in costume.parts.items()]
+        for k, arm in enumerate(costume.arms):
+            parts += [(names_of("upper", number, str(k)), arm.upper), (names_of("fore", number, str(k)), arm.fore)]
+        for prefix, build in parts:
+            for material, mesh in build.meshes():
+                _add(spec, body, dataclasses.replace(material, name=f"{prefix}/{material.name}"), mesh)
+        for name in costume.hidden:
+            for geom in spec.body(name).geoms:
+                if geom.group in VISIBLE_GROUPS:
+                    geom.rgba, geom.material = [0.0, 0.0, 0.0, 0.0], ""
 
 
 def _add(spec: mujoco.MjSpec, body: mujoco.MjsBody, material: Material, mesh: Triangles) -> None:

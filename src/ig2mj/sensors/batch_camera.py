@@ -29,6 +29,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.engine.warp.patches import graphs_kept, pins
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
+from ig2mj.looks.costume import Followers
 from ig2mj.looks.visual import visual_owners
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN
@@ -284,6 +285,7 @@ class BatchCamera:
         known, count = self.engine.scene.model.ngeom, host.ngeom - slots
         owners = visual_owners(self.engine.scene, host, count)
         self._owner = np.concatenate([self.model.tables.geom_object, owners, np.full(slots, -1)])
+        self._followers = Followers(self.engine.scene, host)
         start = mujoco.MjData(host)
         mujoco.mj_forward(host, start)
         self._added = _f32(start.geom_xpos[known:count]), _f32(start.geom_xmat[known:count]).reshape(-1, 3, 3)
@@ -316,18 +318,29 @@ class BatchCamera:
         light_quat = data.xquat[:, body]
         light_pos = data.xpos[:, body] + quat_rotate(light_quat, jnp.asarray(pos))
         light_dir = quat_rotate(light_quat, jnp.asarray(direction))
-        added_pos, added_mat = self._added
+        added_pos, added_mat = self._of_looks(data)
         spread = jax.vmap(lambda time: self._template.replace(time=time))(jnp.zeros(worlds, jnp.float32))
         return spread.tree_replace(
             {
-                "geom_xpos": jnp.concatenate([data.geom_xpos, *_for_worlds(worlds, added_pos), slots.pos], axis=1),
-                "geom_xmat": jnp.concatenate([data.geom_xmat, *_for_worlds(worlds, added_mat), slots.rotation], axis=1),
+                "geom_xpos": jnp.concatenate([data.geom_xpos, *added_pos, slots.pos], axis=1),
+                "geom_xmat": jnp.concatenate([data.geom_xmat, *added_mat, slots.rotation], axis=1),
                 "cam_xpos": camera_pos,
                 "cam_xmat": quat_to_matrix(camera_quat),
                 "_impl.light_xpos": light_pos,
                 "_impl.light_xdir": light_dir,
             }
         )
+
+    def _of_looks(self, data: Any) -> tuple[list[Array], list[Array]]:
+        """Poses [W, E, ...] of what the looks add, as the only member of each list; empty where they add nothing."""
+        pos, axes = (jnp.broadcast_to(jnp.asarray(a), (self.engine.num_worlds, *a.shape)) for a in self._added)
+        if not pos.shape[1]:
+            return [], []
+        if len(self._followers):
+            at = self._followers.geoms - self.engine.scene.model.ngeom
+            own_pos, own_axes = self._followers.poses(data.xpos, quat_to_matrix(data.xquat), jnp)
+            pos, axes = pos.at[:, at].set(own_pos), axes.at[:, at].set(own_axes)
+        return [pos], [axes]
 
     def _look(self, physics: MjxPhysics, states: ExtendedStates, slots: Slots) -> dict[str, Array]:
         """Fields of the model that differ per world: colour and material of tinted geoms, size and colour of slots."""
@@ -365,11 +378,6 @@ def _camera_id(model: mujoco.MjModel, name: str) -> int:
     if number < 0:
         raise UnknownNameError("camera", name, [model.camera(c).name for c in range(model.ncam)])
     return number
-
-
-def _for_worlds(worlds: int, array: np.ndarray) -> list[Array]:
-    """The array once for each world, as the only member of a list; an empty list where it is empty."""
-    return [jnp.broadcast_to(jnp.asarray(array), (worlds, *array.shape))] if len(array) else []
 
 
 def _unpack(packed: Array) -> Array:

@@ -16,6 +16,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from ig2mj.looks.visual import COSTUMES
+
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 
 HIDDEN = 31
@@ -59,7 +61,9 @@ def rigid_parts(host: mujoco.MjModel, scene: mujoco.MjModel, groups: Sequence[in
     seen = np.isin(host.geom_group, list(groups)) & (host.geom_type == MESH) & (alpha(host) > 0)
     by_body: dict[int, list[int]] = {}
     for geom in np.flatnonzero(seen):
-        body = int(scene.geom_bodyid[geom]) if geom < scene.ngeom else 0  # what looks add stands still
+        if geom >= scene.ngeom and host.body(host.geom_bodyid[geom]).name == COSTUMES:
+            continue  # moves by itself
+        body = int(scene.geom_bodyid[geom]) if geom < scene.ngeom else 0  # what else looks add stands still
         welded = int(scene.body_weldid[body])
         mocap = int(scene.body_mocapid[scene.body_rootid[body]]) >= 0
         by_body.setdefault(welded if welded or not mocap else body, []).append(int(geom))

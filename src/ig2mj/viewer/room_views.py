@@ -68,18 +68,18 @@ def room_view(scene: Scene, room: str, fovy: float = FIELD_OF_VIEW) -> FreeView:
 
 
 def _furniture(scene: Scene, room: str) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.ndarray]:
-    """World boxes of fixed objects of the home, and the middles of those in the room."""
+    """World boxes of objects of the home, and the middles of fixed ones in the room."""
     data = scene.start_data()
     boxes, middles = [], []
     for entry in scene.manifest.objects:
-        if not entry.fixed or not entry.in_household or entry.category in ("carpet", "window", "door"):
+        if not entry.in_household or entry.category in ("carpet", "window", "door"):
             continue
         body = mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_BODY, entry.bodies[0])
         turn = data.xmat[body].reshape(3, 3)
         middle = data.xpos[body] + turn @ np.asarray(entry.base_link_offset)
         half = np.abs(turn) @ np.asarray(entry.bounding_box) / 2
         boxes.append((middle - half, middle + half))
-        if room in entry.rooms:
+        if entry.fixed and room in entry.rooms:
             middles.append(middle[:2])
     return boxes, np.array(middles).reshape(-1, 2)
 

@@ -76,6 +76,7 @@ class Stage:
         self._names: list[Any] = []
         self._rooms: list[Any] = []
         self._line: Any = None
+        self._costumes: list[Any] = []
         self.sent = {"poses": 0, "geometries": 0}
         owner = np.asarray(scene.tables.body_object)
         self._object_of = {body: int(owner[body]) for body in range(scene.model.nbody)}
@@ -112,9 +113,27 @@ class Stage:
 
     def _add_decoration(self, geoms: list[int]) -> None:
         """What looks add to the home: one node, which no click is for."""
-        if geoms:
-            content = glb_of_geoms(self._model, geoms, light=self._visual.light)
-            self._server.scene.add_glb("/decoration", content, cast_shadow=False, receive_shadow=False)
+        followers = self._visual.followers
+        still = [g for g in geoms if g not in set(followers.geoms.tolist())]
+        shown: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
+        if still:
+            content = glb_of_geoms(self._model, still, light=self._visual.light)
+            self._server.scene.add_glb("/decoration", content, **shown)
+        for g in followers.geoms.tolist():
+            content = glb_of_geoms(self._model, [g], frames={g: (np.zeros(3), np.array([1.0, 0, 0, 0]))})
+            self._costumes.append(self._server.scene.add_glb(f"/costume{g}", content, **shown))
+        self._move_costumes()
+
+    def _move_costumes(self) -> None:
+        """Sends where the robots' costumes are."""
+        if not self._costumes:
+            return
+        axes = np.asarray(quat_to_matrix(self._quat))
+        pos, turned = (a[0] for a in self._visual.followers.poses(self._pos[None], axes[None]))
+        for k, node in enumerate(self._costumes):
+            quat = np.zeros(4)
+            mujoco.mju_mat2Quat(quat, turned[k].ravel())
+            node.position, node.wxyz = pos[k], quat
 
     def _glb(self, body: int, look: Look = PLAIN) -> bytes:
         """A body's geometry. Light is computed here for those that never turn."""
@@ -183,7 +202,9 @@ class Stage:
             for body in bodies:
                 node = self._nodes[body]
                 node.position, node.wxyz = pos[body], quat[body]
-        self._pos[moved], self._quat[moved] = pos[moved], quat[moved]
+            self._pos[moved], self._quat[moved] = pos[moved], quat[moved]
+            if moved.any():
+                self._move_costumes()
         self.sent["poses"] += len(bodies)
         return len(bodies)
 

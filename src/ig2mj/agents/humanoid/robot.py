@@ -10,6 +10,7 @@ import numpy as np
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.hand_rays import HandRays
 from ig2mj.agents.humanoid.controller import HumanoidController
+from ig2mj.agents.humanoid.costume import costume
 from ig2mj.agents.humanoid.frames import (
     BODY_HEIGHT,
     CAMERA_QUAT,
@@ -40,6 +41,7 @@ from ig2mj.agents.parts import (
 )
 from ig2mj.agents.task_robot import HandControl, TaskRobot
 from ig2mj.errors import UnknownNameError
+from ig2mj.looks.costume import Costume
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
 
@@ -54,6 +56,9 @@ BODY_RADIUS, BODY_HALF = 0.2, 0.3
 
 NO_CONTACT = ("floors", "carpet")
 """Categories that the body passes through: it hovers, and its legs are not simulated."""
+
+CLOTHS = {"grey": (0.25, 0.50, 0.60), "blue": (0.72, 0.38, 0.34)}
+"""Colours of what it wears where homes are decorated."""
 
 SHELL = {"grey": (0.90, 0.90, 0.92), "blue": (0.62, 0.74, 0.90)}
 """Colours, for two of them in one home."""
@@ -175,6 +180,10 @@ class Humanoid(TaskRobot):
                 )
             )
         return tuple(rays)
+
+    def costume(self) -> Costume:
+        """What people see of it: see `ig2mj.agents.humanoid.costume`."""
+        return costume(self.name, CLOTHS[self.look])
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> HumanoidController:
         return HumanoidController(tables, agent, period, self.grasp_flags)
