@@ -14,7 +14,7 @@ import xml.parsers.expat
 from collections.abc import Mapping
 
 from ig2mj.errors import InputError
-from ig2mj.files.limits import refuse_more
+from ig2mj.files.limits import limit, refuse_more
 
 MAX_DEPTH = 490
 """Levels of elements; MuJoCo's XML reader gives up at 500."""
@@ -33,6 +33,8 @@ _CELLS = {
 _COUNTS = {"replicate": "count", "composite": "count", "flexcomp": "count"}
 """Element -> attribute that says how often something is made."""
 _SIDES = {"cube": 6, "skybox": 6}
+_SPECIAL = frozenset((*_CELLS, *_COUNTS, "size", "compiler", "mesh", "include", "model"))
+"""Elements that are more than one element without cells."""
 
 
 def check_mjcf(file: pathlib.Path, text: str | bytes | None = None) -> None:
@@ -51,6 +53,7 @@ class _Counter:
     def __init__(self, file: pathlib.Path):
         self._file = file
         self._elements = self._cells = self._files = 0
+        self._most_elements, self._most_cells = limit("MJCF_ELEMENTS"), limit("MJCF_CELLS")
 
     def read(self, path: pathlib.Path, text: str | bytes | None, repeats: int = 1) -> None:
         self._files += 1
@@ -69,6 +72,10 @@ class _Counter:
             if len(stack) > MAX_DEPTH:
                 raise InputError(path, f"is nested deeper than {MAX_DEPTH} levels", element=f"<{tag}>")
             here = stack[-1]
+            if tag not in _SPECIAL:
+                self._add(here, 0, path, tag)
+                stack.append(here)
+                return
             self._add(here, _cells(tag, attributes) * here, path, tag)
             stack.append(here * _count(tag, attributes))
             if tag in ("composite", "flexcomp"):
@@ -100,8 +107,10 @@ class _Counter:
     def _add(self, elements: int, cells: int, path: pathlib.Path, tag: str) -> None:
         self._elements += elements
         self._cells += cells
-        refuse_more("MJCF_ELEMENTS", self._elements, "asks for", path, f"<{tag}>", " elements or more")
-        refuse_more("MJCF_CELLS", self._cells, "asks for", path, f"<{tag}>", " cells or more")
+        if self._elements > self._most_elements:
+            refuse_more("MJCF_ELEMENTS", self._elements, "asks for", path, f"<{tag}>", " elements or more")
+        if self._cells > self._most_cells:
+            refuse_more("MJCF_CELLS", self._cells, "asks for", path, f"<{tag}>", " cells or more")
 
     def _check_image(self, image: pathlib.Path, path: pathlib.Path) -> None:
         """Each image by itself: homes have hundreds of textures, none of them large."""
