@@ -7,6 +7,7 @@ its shapes and types checked by beartype while the tests run.
 
 from __future__ import annotations
 
+import gc
 import importlib.metadata
 import os
 import re
@@ -68,6 +69,12 @@ def pytest_configure(config: pytest.Config) -> None:
     if getattr(config, "cache", None) is not None:  # without its plugin there is no such attribute
         jax.config.update("jax_compilation_cache_dir", str(config.cache.mkdir("jax")))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+
+
+def pytest_collection_finish() -> None:
+    """What is there for good is never searched for garbage again: that takes a second at a time."""
+    gc.collect()
+    gc.freeze()
 
 
 SHARING = {
