@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import weakref
+from collections.abc import Callable
+from typing import Any
 
 import jax
 import numpy as np
@@ -17,17 +20,38 @@ FACING_TABLE = {"pos": (0.3, 0.62, 0.62), "quat": (np.sqrt(0.5), 0, 0, -np.sqrt(
 """Where the humanoid stands before the tiny home's can."""
 
 
+_MOST_KEPT = 4
+_KEPT: dict[Any, list[Any]] = {}
+"""What worlds of earlier tests were made of, by what they were made for: programs of the same world are the same."""
+
+
+def _kept_for(world: object, key: Any, make: Callable[[], Any]) -> Any:
+    """What an earlier world of this key, which nobody has any more, was made of; else what `make` gives."""
+    free = _KEPT.pop(key, [])
+    _KEPT[key] = free  # the latest one used
+    for old in list(_KEPT)[:-_MOST_KEPT]:
+        del _KEPT[old]
+    made = free.pop() if free else make()
+    weakref.finalize(world, free.append, made).atexit = False
+    return made
+
+
 class RobotWorld:
-    """One world whose first agent is the robot; `act` is one action of `period` seconds."""
+    """One world without states, whose first agent is the robot; `act` is one action of `period` seconds."""
 
     def __init__(self, home: str | os.PathLike, robot: Robot, period: float = 0.1, others: tuple[Robot, ...] = ()):
-        self.scene = ig2mj.load_scene(home, agents=[robot, *others])
-        self.simulation = ig2mj.Simulation(self.scene)
-        self.controller = robot.controller(self.scene.tables, 0, period)
+        def make() -> tuple[Any, ...]:
+            scene = ig2mj.load_scene(home, agents=[robot, *others])
+            controller = robot.controller(scene.tables, 0, period)
+            programs = jax.jit(controller.control), jax.jit(controller.proprioception)
+            return scene, ig2mj.Simulation(scene, states=None), controller, programs
+
+        made = _kept_for(self, (str(home), robot, period, others), make)
+        self.scene, self.simulation, self.controller, (self._control, self._sense) = made
+        self.simulation.reset()
         self.state = self.controller.initial(1)
         self.steps = round(period * 30)
         self._own = self.scene.tables.actuator_agent == 0
-        self._control = jax.jit(self.controller.control)
         self._ctrl = np.zeros(self.scene.model.nu)
 
     @property
@@ -52,7 +76,7 @@ class RobotWorld:
             self.simulation.step(self._ctrl, count=self.steps)
 
     def proprioception(self) -> dict[str, float]:
-        values = np.asarray(self.controller.proprioception(self.view, self.state))[0]
+        values = np.asarray(self._sense(self.view, self.state))[0]
         return dict(zip(self.controller.proprioception_names, values.tolist(), strict=True))
 
 
@@ -72,9 +96,18 @@ class GraspingWorld(RobotWorld):
         engine: str = "native",
         **options,
     ):
-        self.scene = home if isinstance(home, ig2mj.Scene) else ig2mj.load_scene(home, agents=[robot, *others])
-        self.grasping = Grasping(self.scene, mode, targets)
-        self.simulation = ig2mj.Simulation(self.scene, engine, grasping=self.grasping, **options)
+        def make() -> tuple[Any, ...]:
+            scene = home if isinstance(home, ig2mj.Scene) else ig2mj.load_scene(home, agents=[robot, *others])
+            grasping = Grasping(scene, mode, targets)
+            simulation = ig2mj.Simulation(scene, engine, grasping=grasping, **options)
+            return scene, grasping, simulation, jax.jit(simulation.core.controllers[0].proprioception)
+
+        if isinstance(home, ig2mj.Scene) or options:
+            made = make()
+        else:
+            made = _kept_for(self, (str(home), robot, mode, tuple(targets), others, engine), make)
+        self.scene, self.grasping, self.simulation, self._sense = made
+        self.simulation.reset()
         self.controller = self.simulation.core.controllers[0]
 
     @property
