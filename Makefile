@@ -74,9 +74,10 @@ demo: setup
 	@$(BIN)/ig2mj demo
 
 # Most of the quick tests' time is XLA's, for programs that then run a few times; so it is told not to optimize them.
-# Whoever runs pytest, and the slow tests, get programs as they are elsewhere.
+# Whoever runs pytest, and the slow tests, get programs as they are elsewhere. Byte code is kept: else both processes, and
+# every command that a test starts, compile all modules again.
 test: setup
-	@JAX_DISABLE_MOST_OPTIMIZATIONS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "not slow and not gpu" $(PYTEST_ARGS)
+	@PYTHONDONTWRITEBYTECODE= JAX_DISABLE_MOST_OPTIMIZATIONS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "not slow and not gpu" $(PYTEST_ARGS)
 
 test-slow: setup web
 	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "slow and not gpu" --timeout 1800 $(PYTEST_ARGS)

@@ -68,7 +68,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
     if getattr(config, "cache", None) is not None:  # without its plugin there is no such attribute
         jax.config.update("jax_compilation_cache_dir", str(config.cache.mkdir("jax")))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
 
 def pytest_collection_finish() -> None:

@@ -29,7 +29,7 @@ def test_both_ways_give_the_same_and_the_same_gradients(shape, stride):
 @pytest.mark.parametrize(("platform", "convolves"), [("cpu", False), ("cuda", True)])
 def test_a_program_convolves_as_its_platform_does(platform, convolves):
     encoder, pictures = Convolutions((32, 32, 4), "points"), jnp.zeros((2, 32 * 32 * 4), jnp.uint8)
-    params = encoder.init(jax.random.PRNGKey(0), pictures)
+    params = jax.jit(encoder.init)(jax.random.PRNGKey(0), pictures)
 
     def slope(params, pictures):
         return jax.grad(lambda p: encoder.apply(p, pictures).sum())(params)

@@ -154,7 +154,7 @@ def test_dagger_s_reported_success_is_not_too_high_when_the_expert_leaves():
     rng, worlds, leaves = np.random.default_rng(0), 1000, 600
     perception = Perception({"proprioception": Space((2,), np.float32, -1.0, 1.0)})
     algorithm = Dagger(perception, 1, None, DaggerConfig(actor_layers=(4,), beta_decay=0.6, action_bins=0), horizon=200)
-    learner, turns = algorithm.init(jax.random.PRNGKey(0)), algorithm.acting_state(worlds)
+    learner, turns = jax.jit(algorithm.init)(jax.random.PRNGKey(0)), algorithm.acting_state(worlds)
     learner = dataclasses.replace(learner, updates=jnp.int32(10_000))
     act, seen = jax.jit(algorithm.act), Seen(jnp.zeros((worlds, 2)), jnp.zeros((worlds, 0), jnp.uint8))
     steps, wins = np.ones(worlds, int), rng.random(worlds) < 0.1
@@ -211,7 +211,7 @@ def test_dagger_s_actor_is_a_running_mean_of_what_it_learns():
         buffer_size=16,
     )
     algorithm = Dagger(perception, 1, None, config)
-    learner, memory = algorithm.init(jax.random.PRNGKey(0)), algorithm.buffer(4)
+    learner, memory = jax.jit(algorithm.init)(jax.random.PRNGKey(0)), algorithm.buffer(4)
     learn, rng = jax.jit(algorithm.learn), np.random.default_rng(0)
     quick, mean = [], None
     for k in range(12):

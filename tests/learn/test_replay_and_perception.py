@@ -270,7 +270,7 @@ def test_whether_actions_train_the_encoder(encoder, moved):
     @jax.jit
     def slopes(key):
         """Of the actions and of the guess."""
-        params = actor.init(key, vector, picture)["params"]
+        params = jax.jit(actor.init)(key, vector, picture)["params"]
         _, back = jax.vjp(lambda p: actor.apply({"params": p}, vector, picture), params)
         told: Any = actor.apply({"params": params}, vector, picture)
         found = []
@@ -292,7 +292,7 @@ def test_how_an_object_is_turned_is_learnt_from_its_own_glimpse_which_nothing_el
 
     @jax.jit
     def slopes(key):
-        params = actor.init(key, vector, picture)["params"]
+        params = jax.jit(actor.init)(key, vector, picture)["params"]
 
         def of(part):
             def loss(params):

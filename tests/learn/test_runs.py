@@ -74,7 +74,7 @@ def rows(out):
 @pytest.mark.slow
 def test_a_resumed_run_goes_on_with_what_was_learned(done, tmp_path):
     env, out, result = done
-    like = {"learner": algorithm(env).init(jax.random.PRNGKey(7)), "key": jax.random.PRNGKey(0)}
+    like = {"learner": jax.jit(algorithm(env).init)(jax.random.PRNGKey(7)), "key": jax.random.PRNGKey(0)}
     checkpoints = Checkpoints(out)
     tree, meta = checkpoints.newest(like, checkpoints.meta(12)["depends"])
     assert same(tree["learner"], result.learner)
@@ -130,7 +130,7 @@ def test_numbers_that_are_lost_stop_the_run_with_the_last_good_checkpoint(tmp_pa
     with pytest.raises(Ig2mjError, match="the reward's term 'way' is nan, and must be finite"):
         train(env, algorithm(env), Run(iterations=400, out=tmp_path, checkpoint_every=0.0, quiet=True))
     newest = Checkpoints(tmp_path).numbers()[-1]
-    like = {"learner": algorithm(env).init(jax.random.PRNGKey(7)), "key": jax.random.PRNGKey(0)}
+    like = {"learner": jax.jit(algorithm(env).init)(jax.random.PRNGKey(7)), "key": jax.random.PRNGKey(0)}
     tree, _ = Checkpoints(tmp_path).newest(like, Checkpoints(tmp_path).meta(newest)["depends"])
     floats = [a for a in jax.tree.leaves(tree) if a.dtype == np.float32]
     assert all(np.isfinite(a).all() for a in floats)

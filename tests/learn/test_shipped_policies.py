@@ -39,7 +39,7 @@ def made(sizes=(16, 16), **world) -> Policy:
     env = PointMass(2)
     perception = Perception(env.observation_spaces)
     algorithm = BC(perception, 2, BCConfig(actor_layers=sizes))
-    actor, _ = algorithm.imitation.init(jax.random.PRNGKey(0))
+    actor, _ = jax.jit(algorithm.imitation.init)(jax.random.PRNGKey(0))
     learner = type("Learner", (), {"actor": actor, "moments": RunningStats.initial(4)})
     said = {"task": "CookingMeat", "robot": "humanoid", "grasping": "mitten", "actions": ["x", "y"], **world}
     depends = depends_of({**world_of(env), **said}, perception)

@@ -141,7 +141,7 @@ def clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any] | No
 def _clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any]) -> tuple[Any, dict]:
     depends = {**depends, "algorithm": "bc", "settings": dataclasses.asdict(algorithm.config)}
     key = jax.random.PRNGKey(run.seed)
-    learner = algorithm.init(key, demos)
+    learner = jax.jit(algorithm.init)(key, demos)
     checkpoints, log = (
         (Checkpoints(run.out) if run.out is not None else None),
         Log(run.out, quiet=run.quiet, minutes=run.minutes),
@@ -195,4 +195,4 @@ def begin_as_clone(algorithm: Any, demos: Demos, seed: int, updates: int = 2000)
     )
     cloner = BC(algorithm.perception, algorithm.action_size, config)
     learner, _ = clone(cloner, demos, Run(minutes=60.0, seed=seed, quiet=True))
-    return algorithm.cloned(algorithm.init(jax.random.PRNGKey(seed)), learner.actor, learner.moments)
+    return algorithm.cloned(jax.jit(algorithm.init)(jax.random.PRNGKey(seed)), learner.actor, learner.moments)

@@ -123,7 +123,7 @@ class _Training:
         self.file = None if code is None else code.file
         self.depends = {**depends, "algorithm": algorithm.name, "settings": settings, "save_buffer": run.save_buffer}
         first_key, self.key = jax.random.split(jax.random.PRNGKey(run.seed))
-        self.learner = algorithm.init(first_key) if learner is None else learner
+        self.learner = jax.jit(algorithm.init)(first_key) if learner is None else learner
         self.step: Any = (
             ManyDevices(env, algorithm, devices, team) if devices else OneDevice(env, algorithm, run.programs)
         )

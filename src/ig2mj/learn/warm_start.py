@@ -33,7 +33,7 @@ def init_from_policy(algorithm: Any, policy: Policy, seed: int, file: object = "
     Raises:
       InputError: its networks have other layers, or its scales are not in the file.
     """
-    learner = algorithm.init(jax.random.PRNGKey(seed))
+    learner = jax.jit(algorithm.init)(jax.random.PRNGKey(seed))
     mine, theirs = flat(learner.actor), policy.weights
     if mine.keys() != theirs.keys():
         other = sorted(mine.keys() ^ theirs.keys())[0]

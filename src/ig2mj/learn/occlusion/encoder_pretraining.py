@@ -64,7 +64,7 @@ def pretrain(
       report: called now and then with the updates so far, the learner and the loss; None: that is printed.
     """
     key, first_key = jax.random.split(jax.random.PRNGKey(seed))
-    learner, began = algorithm.init(first_key), time.monotonic()
+    learner, began = jax.jit(algorithm.init)(first_key), time.monotonic()
     images = jax.tree.map(jnp.asarray, algorithm.unlabelled)
     learner = dataclasses.replace(learner, moments=learner.moments.update(images.vector))
     program = jax.jit(
