@@ -15,7 +15,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, Unpack, cast, overload
+from typing import TYPE_CHECKING, Any, Literal, Unpack, cast, overload
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
@@ -50,6 +50,9 @@ from ig2mj.tasks.registry import TASKS as TASK_NAMES
 from ig2mj.tasks.task import Task
 from ig2mj.tasks.variants import variant as task_variant
 from ig2mj.worlds.core import Core
+
+if TYPE_CHECKING:
+    from ig2mj.envs.primitives import PrimitiveEnv
 
 __all__ = ["TASKS", "VECTORS", "default_config", "find_task", "list_envs", "make"]
 
@@ -114,6 +117,10 @@ def default_config(name: str | Definition) -> EnvConfig:
 
 
 @overload
+def make(name: str, *, action_space: Literal["primitives"], **options: Any) -> PrimitiveEnv: ...
+
+
+@overload
 def make(
     name: str | Definition,
     config: EnvConfig | Mapping[str, Any] | None = None,
@@ -145,8 +152,9 @@ def make(
     grasping: str | None = None,
     *,
     config_overrides: Mapping[str, Any] | None = None,
+    action_space: str = "continuous",
     **overrides: Any,
-) -> Environment:
+) -> Environment | PrimitiveEnv:
     """Makes an environment.
 
     Args:
@@ -159,6 +167,7 @@ def make(
       worlds: see `EnvConfig`. engine: likewise. grasping: likewise.
       config_overrides: settings by name, in place of those of `config`.
       overrides: likewise, as keyword arguments: fields of `EnvConfig` and options of the engine (`EngineOptions`).
+      action_space: "continuous", or "primitives": a `PrimitiveEnv`, whose arguments the overrides then are.
 
     Raises:
       UnknownNameError: no such environment, robot, mode, observation, engine, setting or split; with near matches.
@@ -166,6 +175,10 @@ def make(
         outside of it. InputError: there is no such home. BindingError: the activity does not fit into it.
     """
     given = {"worlds": worlds, "engine": engine, "grasping": grasping}
+    if action_space not in ACTION_SPACES:
+        raise UnknownNameError("action space", action_space, ACTION_SPACES)
+    if action_space == "primitives":
+        return _make_primitives(name, overrides, {**given, "config": config, "config_overrides": config_overrides})
     overrides = {**{k: value for k, value in given.items() if value is not None}, **overrides}
     task = task_named(name)
     if isinstance(config, EnvConfig):
@@ -175,6 +188,21 @@ def make(
     else:
         chosen = EnvConfig().override(robot=config)
     return _make(task, chosen.override(config_overrides, **overrides))
+
+
+ACTION_SPACES = ("continuous", "primitives")
+
+
+def _make_primitives(name: Any, options: Mapping[str, Any], others: Mapping[str, Any]) -> PrimitiveEnv:
+    """An environment of primitives. Raises EngineError: an option that it does not have."""
+    from ig2mj.envs.primitives import OPTIONS, PrimitiveEnv
+
+    if not isinstance(name, str):
+        raise EngineError("an environment of primitives is made by its name")
+    for option in [*options, *(k for k, value in others.items() if value is not None)]:
+        if option not in OPTIONS:
+            raise UnknownNameError("option of an environment of primitives", option, OPTIONS)
+    return PrimitiveEnv(name, **options)
 
 
 def _make(task: AnyTask, config: EnvConfig) -> Environment:
