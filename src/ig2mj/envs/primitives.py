@@ -45,9 +45,6 @@ HORIZON = 60
 
 RUNGS = ("physics", "symbolic")
 
-OPTIONS = ("robot", "rung", "split", "pool_size", "horizon")
-"""Of `PrimitiveEnv`, by name."""
-
 Request = int | np.integer | Step | Mapping[str, Any]
 """An action: a number of `PrimitiveEnv.actions`, a step, or a function call (`ig2mj.planning.words.tools`)."""
 

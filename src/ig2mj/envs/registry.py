@@ -13,9 +13,11 @@ which runs its code (`ig2mj.CustomTask`).
 from __future__ import annotations
 
 import dataclasses
+import importlib
+import inspect
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Unpack, cast, overload
+from typing import Any, Literal, Unpack, cast, overload
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
@@ -50,9 +52,6 @@ from ig2mj.tasks.registry import TASKS as TASK_NAMES
 from ig2mj.tasks.task import Task
 from ig2mj.tasks.variants import variant as task_variant
 from ig2mj.worlds.core import Core
-
-if TYPE_CHECKING:
-    from ig2mj.envs.primitives import PrimitiveEnv
 
 __all__ = ["TASKS", "VECTORS", "default_config", "find_task", "list_envs", "make"]
 
@@ -117,10 +116,6 @@ def default_config(name: str | Definition) -> EnvConfig:
 
 
 @overload
-def make(name: str, *, action_space: Literal["primitives"], **options: Any) -> PrimitiveEnv: ...
-
-
-@overload
 def make(
     name: str | Definition,
     config: EnvConfig | Mapping[str, Any] | None = None,
@@ -143,6 +138,10 @@ def make(
 ) -> Environment: ...
 
 
+@overload
+def make(name: str, *, action_space: Literal["primitives"], **options: Any) -> Any: ...
+
+
 @entry_point
 def make(
     name: str | Definition,
@@ -154,7 +153,7 @@ def make(
     config_overrides: Mapping[str, Any] | None = None,
     action_space: str = "continuous",
     **overrides: Any,
-) -> Environment | PrimitiveEnv:
+) -> Any:
     """Makes an environment.
 
     Args:
@@ -167,7 +166,11 @@ def make(
       worlds: see `EnvConfig`. engine: likewise. grasping: likewise.
       config_overrides: settings by name, in place of those of `config`.
       overrides: likewise, as keyword arguments: fields of `EnvConfig` and options of the engine (`EngineOptions`).
-      action_space: "continuous", or "primitives": a `PrimitiveEnv`, whose arguments the overrides then are.
+      action_space: "continuous", or "primitives": a `ig2mj.envs.primitives.PrimitiveEnv`, a Gymnasium environment whose
+        arguments the overrides then are.
+
+    Returns:
+      An `Environment`, or what the action space says.
 
     Raises:
       UnknownNameError: no such environment, robot, mode, observation, engine, setting or split; with near matches.
@@ -177,8 +180,9 @@ def make(
     given = {"worlds": worlds, "engine": engine, "grasping": grasping}
     if action_space not in ACTION_SPACES:
         raise UnknownNameError("action space", action_space, ACTION_SPACES)
-    if action_space == "primitives":
-        return _make_primitives(name, overrides, {**given, "config": config, "config_overrides": config_overrides})
+    if ACTION_SPACES[action_space]:
+        others = {**given, "config": config, "config_overrides": config_overrides}
+        return _make_other(action_space, name, overrides, others)
     overrides = {**{k: value for k, value in given.items() if value is not None}, **overrides}
     task = task_named(name)
     if isinstance(config, EnvConfig):
@@ -190,19 +194,21 @@ def make(
     return _make(task, chosen.override(config_overrides, **overrides))
 
 
-ACTION_SPACES = ("continuous", "primitives")
+ACTION_SPACES = {"continuous": "", "primitives": "ig2mj.envs.primitives:PrimitiveEnv"}
+"""Action spaces of `make`, and the class of the environments of each where that is not `Environment`."""
 
 
-def _make_primitives(name: Any, options: Mapping[str, Any], others: Mapping[str, Any]) -> PrimitiveEnv:
-    """An environment of primitives. Raises EngineError: an option that it does not have."""
-    from ig2mj.envs.primitives import OPTIONS, PrimitiveEnv
-
+def _make_other(action_space: str, name: Any, options: Mapping[str, Any], others: Mapping[str, Any]) -> Any:
+    """An environment of a class of `ACTION_SPACES`. Raises UnknownNameError: an option that it does not have."""
+    module, _, kind = ACTION_SPACES[action_space].partition(":")
+    made = getattr(importlib.import_module(module), kind)
     if not isinstance(name, str):
-        raise EngineError("an environment of primitives is made by its name")
+        raise EngineError(f"an environment with action_space='{action_space}' is made by its name")
+    known = inspect.getfullargspec(inspect.unwrap(made.__init__)).kwonlyargs
     for option in [*options, *(k for k, value in others.items() if value is not None)]:
-        if option not in OPTIONS:
-            raise UnknownNameError("option of an environment of primitives", option, OPTIONS)
-    return PrimitiveEnv(name, **options)
+        if option not in known:
+            raise UnknownNameError(f"option with action_space='{action_space}'", option, known)
+    return made(name, **options)
 
 
 def _make(task: AnyTask, config: EnvConfig) -> Environment:
