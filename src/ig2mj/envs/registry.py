@@ -16,6 +16,7 @@ import dataclasses
 import importlib
 import inspect
 import os
+import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Unpack, cast, overload
 
@@ -30,8 +31,9 @@ from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
 from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, EnvSetup, setup_activity, setup_bddl, setup_navigation
-from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.errors import EngineError, Ig2mjError, UnknownNameError
 from ig2mj.process import entry_point
+from ig2mj.scene.paths import shipped_homes
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.added_objects import object_texts, with_objects
@@ -93,6 +95,12 @@ def find_task(name: str) -> AnyTask:
     short = short_name(name)
     if short is None:
         also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`), tasks of yours FILE.py:NAME"
+        if name in shipped_homes() or pathlib.Path(name).is_dir():
+            goal = f'"goal/{name} GOAL"'
+            raise Ig2mjError(
+                f"'{name}' is a home, and an environment is a task in one: {', '.join(list_envs())}, {goal}; {also};"
+                f" `ig2mj view {name}` shows the home"
+            )
         raise UnknownNameError("environment", name.removeprefix(f"{NAMESPACE}/"), list_envs(), also=also)
     return REGISTERED[short].task if short in REGISTERED else TASKS[short]
 

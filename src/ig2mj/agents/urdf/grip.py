@@ -127,8 +127,8 @@ def gripper_rays(name: str, body: RobotBody, gripper: Gripper) -> HandRays | Non
         middles = {tip: _to_base(body, tip, body.box(tip)[0][None], data)[0] for tip in tips}
         towards = np.mean([middles[other] for other in opposite], axis=0)
         palm = body.pose(hand, data)[0]
-        starts = _face(body, one, towards - middles[one], palm, data)
-        others = [(other, _face(body, other, middles[one] - middles[other], palm, data)) for other in opposite]
+        starts = _face(body, gripper, one, towards - middles[one], palm, data)
+        others = [(other, _face(body, gripper, other, middles[one] - middles[other], palm, data)) for other in opposite]
     ends = np.concatenate([points for _, points in others])
     inner = [_to_base(body, one, starts, data).mean(0), np.mean([_to_base(body, *o, data).mean(0) for o in others], 0)]
     palm_pos, palm_turn = body.pose(hand, data)
@@ -151,18 +151,24 @@ def _opposed(body: RobotBody, tips: list[str], data: mujoco.MjData) -> tuple[str
     return one, others[:OPPOSITE]
 
 
-def _face(body: RobotBody, link: str, inward: np.ndarray, palm: np.ndarray, data: mujoco.MjData) -> np.ndarray:
-    """Four points [4, 3] on the side of a fingertip's box that faces `inward`, in the finger's frame.
+def _face(
+    body: RobotBody, gripper: Gripper, link: str, inward: np.ndarray, palm: np.ndarray, data: mujoco.MjData
+) -> np.ndarray:
+    """Four points [4, 3] on the side of a fingertip's box that faces `inward`, in the frame of the finger's last link.
 
     inward: in the base's frame. palm: where the hand is, in the base's frame, m.
     """
-    pos, turn = body.pose(link, data)
-    local, points = turn.T @ inward, body.edge_points(link)
+    (pos, turn), points = body.pose(link, data), body.edge_points(link)
+    local = turn.T @ inward
     outward = points.mean(0) - turn.T @ (palm - pos)
     along = local / max(float(np.linalg.norm(local)), 1e-9)
     outward = outward - along * (outward @ along)
-    reach = points @ (outward / max(float(np.linalg.norm(outward)), 1e-9))
-    tip = points[reach >= reach.max() - FINGERTIP * np.ptp(reach)]
+    outward = outward / max(float(np.linalg.norm(outward)), 1e-9)
+    branch = body.branch(link, gripper)
+    inner = [part for part in body.fingers(gripper) if part != link and body.branch(part, gripper) == branch]
+    whole = np.concatenate([points, *((_to_base(body, part, body.points(part), data) - pos) @ turn for part in inner)])
+    reach = points @ outward
+    tip = points[reach >= reach.max() - FINGERTIP * np.ptp(whole @ outward)]
     centre, half = (tip.min(0) + tip.max(0)) / 2, np.ptp(tip, axis=0) / 2
     across = int(np.argmax(np.abs(local)))
     sides = [k for k in range(3) if k != across]

@@ -5,6 +5,7 @@ It takes FILE.py:NAME, or activity/FILE.bddl.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import tyro
@@ -34,3 +35,22 @@ def task_option(name: str) -> str:
 
     own = split_reference(name) is not None or name.endswith(".bddl")
     return f" --task {name}" if own else ""
+
+
+def few_rows(name: str, split: str, rows: int, objects: Sequence[str] = ()) -> int:
+    """Number of start states that a few episodes of a task need: `rows` where the task is of the user's and its pool
+    does not exist yet, so that sampling does not keep them waiting; 0: all of the split.
+
+    Raises:
+      As `make`.
+    """
+    from ig2mj.envs.registry import find_task
+    from ig2mj.tasks.added_objects import with_objects
+    from ig2mj.tasks.pools import COUNT, start_states
+    from ig2mj.tasks.task import Task
+
+    task = find_task(name)
+    if not isinstance(task, Task) or task.code is None:
+        return 0
+    there = start_states(with_objects(task, tuple(objects)), split).rows_at_hand
+    return max(there, rows) if there < COUNT[split] else 0

@@ -127,14 +127,19 @@ def line_in(error: Exception, file: str) -> str:
     return f", line {frames[-1].lineno}" if frames else ""
 
 
+PURE = "compute with jax.numpy instead of numpy, and with jnp.where instead of if"
+"""What a function of arrays does."""
+
+
 def _said(error: Exception) -> str:
     """The first sentence of an error of the user's code."""
     if isinstance(error, Ig2mjError):
         return str(error)
     kind = type(error).__name__
     if kind in ("TracerArrayConversionError", "TracerBoolConversionError", "ConcretizationTypeError"):
-        fix = "it must be pure: compute with jax.numpy instead of numpy, and with jnp.where instead of if"
-        return f"cannot be compiled ({kind}): {fix}"
+        return f"cannot be compiled ({kind}): it must be pure: {PURE}"
+    if isinstance(error, ValueError) and "truth value of an array" in str(error):
+        return f"an array has a value for each world, and no single truth value: {PURE}"
     text = next(iter(str(error).splitlines()), "")[:200]
     return f"{kind}: {text}" if text else kind
 

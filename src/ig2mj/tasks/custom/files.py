@@ -111,12 +111,16 @@ def registered_in(file: str, name: str) -> RegisteredTask:
 
 def registered_of(file: str) -> list[RegisteredTask]:
     """All tasks of a file. Raises as `task_of_file`; InputError: it defines none."""
-    module = import_file(file)
-    names = names_in(module)
+    return [registered_in(file, name) for name in task_names(file)]
+
+
+def task_names(file: str) -> list[str]:
+    """Names of the tasks of a file. Raises as `import_file`; InputError: it defines none."""
+    names = names_in(import_file(file))
     if not names:
         fix = "a class derived from ig2mj.CustomTask is one"
         raise InputError(shown(file), "defines no task", fix=fix)
-    return [registered_in(file, name) for name in names]
+    return names
 
 
 def names_in(module: ModuleType) -> list[str]:
