@@ -52,5 +52,7 @@ def few_rows(name: str, split: str, rows: int, objects: Sequence[str] = ()) -> i
     task = find_task(name)
     if not isinstance(task, Task) or task.code is None:
         return 0
-    there = start_states(with_objects(task, tuple(objects)), split).rows_at_hand
+    whole = with_objects(task, tuple(objects))
+    assert isinstance(whole, Task)
+    there = start_states(whole, split).rows_at_hand
     return max(there, rows) if there < COUNT[split] else 0
