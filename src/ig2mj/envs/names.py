@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import pathlib
 import re
+from collections.abc import Sequence
 from typing import Any
 
-from ig2mj.errors import InputError
+from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
+from ig2mj.scene.paths import shipped_homes
 from ig2mj.tasks.registry import REGISTERED, TASKS, split_reference
 
 NAMESPACE, VERSION = "ig2mj", 0
@@ -52,3 +55,15 @@ def register(gymnasium: Any) -> None:
                 kwargs={"task": REGISTERED[name].reference if name in REGISTERED else name},
                 disable_env_checker=True,  # it would reset and step once more than is needed; a test runs it
             )
+
+
+def unknown_environment(name: str, known: Sequence[str]) -> Ig2mjError:
+    """The error of a name that is no environment's. known: names of environments."""
+    also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`), tasks of yours FILE.py:NAME"
+    if name in shipped_homes() or pathlib.Path(name).is_dir():
+        goal = f'"goal/{name} GOAL"'
+        return Ig2mjError(
+            f"'{name}' is a home, and an environment is a task in one: {', '.join(known)}, {goal}; {also};"
+            f" `ig2mj view {name}` shows the home"
+        )
+    return UnknownNameError("environment", name.removeprefix(f"{NAMESPACE}/"), known, also=also)

@@ -16,7 +16,6 @@ import dataclasses
 import importlib
 import inspect
 import os
-import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Unpack, cast, overload
 
@@ -28,12 +27,11 @@ from ig2mj.engine.base import whole_number
 from ig2mj.engine.registry import check_options, choose_engine, make_engine
 from ig2mj.envs.config import VECTORS, EnvConfig, Overrides, default_of
 from ig2mj.envs.environment import Environment
-from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
+from ig2mj.envs.names import NAMES, activity_name, short_name, unknown_environment
 from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, EnvSetup, setup_activity, setup_bddl, setup_navigation
-from ig2mj.errors import EngineError, Ig2mjError, UnknownNameError
+from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
-from ig2mj.scene.paths import shipped_homes
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.added_objects import object_texts, with_objects
@@ -94,14 +92,7 @@ def find_task(name: str) -> AnyTask:
         return bddl_task(activity)
     short = short_name(name)
     if short is None:
-        also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`), tasks of yours FILE.py:NAME"
-        if name in shipped_homes() or pathlib.Path(name).is_dir():
-            goal = f'"goal/{name} GOAL"'
-            raise Ig2mjError(
-                f"'{name}' is a home, and an environment is a task in one: {', '.join(list_envs())}, {goal}; {also};"
-                f" `ig2mj view {name}` shows the home"
-            )
-        raise UnknownNameError("environment", name.removeprefix(f"{NAMESPACE}/"), list_envs(), also=also)
+        raise unknown_environment(name, list_envs())
     return REGISTERED[short].task if short in REGISTERED else TASKS[short]
 
 
