@@ -90,6 +90,12 @@ class Domain:
         return tuple(tables.object_names[o] for o in np.flatnonzero(usable))
 
     @functools.cached_property
+    def loose(self) -> tuple[str, ...]:
+        """Objects that can be moved and are in use."""
+        tables = self.model.tables
+        return tuple(tables.object_names[o] for o in np.flatnonzero(~tables.object_fixed & ~tables.object_parked))
+
+    @functools.cached_property
     def tools(self) -> tuple[str, ...]:
         """Cleaning tools that can be carried."""
         return self._loose("cleaningTool")

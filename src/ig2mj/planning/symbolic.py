@@ -16,10 +16,12 @@ import numpy as np
 
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import AbilityError, StateError
-from ig2mj.planning.domain import Domain
+from ig2mj.planning.domain import Domain, condition_of
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.problem import start_of
 from ig2mj.planning.steps import Outcome, PlanningError, Step
+from ig2mj.predicates.logic import Atom
+from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.many import make_sampler
 from ig2mj.sampling.placement import Budget, Rejections
 from ig2mj.sampling.row import RowSampler
@@ -141,13 +143,27 @@ class SymbolicRung:
             return "" if facts.holds("inside", name, source) else f"{name} is not inside {source}"
         return "" if name in held else f"no hand holds {name}"
 
+    def _around(self, step: Step, facts: Facts, held: Sequence[str]) -> list[Condition]:
+        """What is in or on the same thing already, which an object that is put there may push aside."""
+        predicate = {"place_inside": "inside", "place_on_top": "on_top"}.get(step.primitive)
+        if predicate is None:
+            return []
+        name, target = step.arguments
+        (low, high), found = facts.box(target), []
+        for other in self._domain.loose:
+            middle = facts.place(other)
+            if other not in (name, target, *held) and (low[:2] <= middle[:2]).all() and (middle[:2] <= high[:2]).all():
+                found.append(Atom(predicate, (other, target)))
+        return [condition_of(atom) for atom, holds in facts.truth(found).items() if holds]
+
     def _make_true(self, world: int, own: _SymbolicWorld, step: Step) -> Outcome | None:
         """The failure, or None: the world is changed so that what the step adds holds."""
         rng = np.random.default_rng([self._seed, self._first + world, own.count])
         rejected: Rejections = collections.Counter()
         self._sampler.start_from(own.physics, own.states)
         try:
-            row = self._sampler.sample(list(step.adds), rng, Budget(WORK), rejected)
+            around = self._around(step, self.facts(world), own.held)
+            row = self._sampler.sample(list(step.adds), rng, Budget(WORK), rejected, around=around)
         except (StateError, AbilityError) as e:
             return Outcome("not_true_after", str(e))
         if row is None:

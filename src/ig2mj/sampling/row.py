@@ -94,6 +94,7 @@ class RowSampler:
         rejected: Rejections,
         keep: bool = False,
         again: Collection[str] = (),
+        around: Sequence[Condition] = (),
     ) -> Row | None:
         """A row, or None where the budget did not suffice; the world is left in it.
 
@@ -102,6 +103,7 @@ class RowSampler:
           keep: leave objects as they are of which everything holds already, place larger objects first, and let objects
             that have been placed be pushed so long as their conditions hold; else every object is placed again.
           again: objects that are placed again nevertheless, on their flattest side.
+          around: placements that hold, of objects that may be pushed so long as these hold.
 
         Raises:
           StateError, AbilityError, UnknownNameError: a condition that can never be made true.
@@ -110,6 +112,7 @@ class RowSampler:
         self._truths_of(tuple(conditions))  # refuses what can never hold
         self.query.load(self._start)
         self._states, self._keep, self._again = self._initial, keep, frozenset(again)
+        self._around = tuple(around)
         self._others = Bystanders(self.query, self._start)
         placed = {name for name, wanted in plan.placements if wanted[0].value}
         self._joints = [c for c in plan.joints if c.arguments[0] in placed]
@@ -121,7 +124,7 @@ class RowSampler:
         if not self._place_all(plan.placements, rng, budget, rejected):
             return None
         self._set_all([c for c in plan.states if c not in cuts], rng)
-        problem = self._problem(conditions, [name for name, _ in plan.placements])
+        problem = self._problem((*conditions, *around), [name for name, _ in plan.placements])
         if problem:
             rejected[problem] += 1
             return None
@@ -199,8 +202,9 @@ class RowSampler:
         along = -1
         if rule.value and rule.predicate != "on_floor":
             along = object_index(self.model, rule.other_than(name))
-        earlier = tuple(c for _, placed in self._placed for c in placed)
-        pushable = {object_index(self.model, n) for n, _ in self._placed if n not in self._fixed}
+        earlier = (*(c for _, placed in self._placed for c in placed), *self._around)
+        moving = (*(n for n, _ in self._placed), *(c.arguments[0] for c in self._around))
+        pushable = {object_index(self.model, n) for n in moving if n not in self._fixed and n != name}
         done = self._placer.place(
             index,
             areas,
