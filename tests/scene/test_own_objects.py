@@ -67,6 +67,24 @@ def test_an_object_may_not_start_inside_of_another(tiny_home_folder, cup):
     assert ig2mj.load_scene(tiny_home_folder, objects=[first, f"{cup}@0.58,0.25,1,0"]).additions
 
 
+def test_an_object_may_not_start_above_the_walls_or_be_fixed_in_one(cup):
+    with pytest.raises(Ig2mjError, match=r"starts 5.\d m above the floor, and the walls end at [23].\d m"):
+        ig2mj.load_scene("small_home", objects=[f"{cup}@0.5,0.25,5.8,90"])
+    scene = ig2mj.load_scene("small_home")
+    wall = next(name for name in scene.object_names if scene.object(name).category == "walls")
+    data = scene.start_data()
+    owned = np.asarray(scene.tables.geom_object) == scene.object_index(wall)
+    geom = int(np.flatnonzero(owned & (scene.model.geom_contype > 0))[0])
+    x, y, z = data.geom_xpos[geom]
+    with pytest.raises(Ig2mjError, match=r"is fixed \d+ cm inside of a wall"):
+        ig2mj.load_scene("small_home", objects=[f"{cup}@fixed:{x + 0.1},{y + 0.05},{z},0"])
+
+
+def test_furniture_is_made_by_a_command_that_the_error_names(tiny_home_folder):
+    with pytest.raises(UnknownNameError, match=r"ig2mj homes model fridge --out DIR"):
+        ig2mj.load_scene(tiny_home_folder, objects=["fridge@1,1,1,0"])
+
+
 @pytest.mark.slow
 def test_a_predicate_says_where_an_object_starts_in_the_same_place_every_time(tiny_home_folder, cup):
     wanted = [f"{cup}@on_top:box", f"{cup}@on_top:box"]

@@ -18,6 +18,7 @@ import re
 import msgspec
 
 from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
+from ig2mj.knowledge.taxonomy import synset
 from ig2mj.scene import own_libraries, paths
 from ig2mj.scene.manifest import Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.paths import MANIFEST_FILE
@@ -201,5 +202,7 @@ def _no_such_model(wanted: str, category: str, model: str, own: dict[str, dict[s
     if model and category in categories:
         models = [*library().get(category, {}), *own.get(category, {})]
         return UnknownNameError(f"model of '{category}' in the object library", model, models, also=also)
+    if synset(category) is not None:  # furniture has no models in the library
+        also += f"; `ig2mj homes model {wanted} --out DIR` writes furniture as such a folder"
     names = [*categories, *(f"{c}/{m}" for c, models in own.items() for m in models)]
     return UnknownNameError("category of the object library", wanted if "/" in wanted else category, names, also=also)
