@@ -54,6 +54,9 @@ class Context:
         return jnp.zeros((self.num_worlds, len(arguments)), bool)
 
 
+Role = Literal["object", "room", "object or agent", "substance"]
+"""What an argument is. Substances count as `substance_names` of `ig2mj.predicates.substances` does."""
+
 Evaluate = Callable[[Context, Arguments], Bool[Array, "W P"]]
 OfStates = Callable[[StateModel, ExtendedStates], Bool[Array, "W O"]]
 SetTruth = Callable[[StateModel, ExtendedStates, Bool[Array, "#W O"], bool], Values]
@@ -83,7 +86,7 @@ class Predicate:
     """
 
     name: str
-    arguments: tuple[Literal["object", "room", "object or agent"], ...]
+    arguments: tuple[Role, ...]
     evaluate: Evaluate
     ability: str | None = None
     aliases: tuple[str, ...] = ()

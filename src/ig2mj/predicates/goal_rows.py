@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ig2mj.engine.view import SCHEMA, Array
-from ig2mj.predicates.literals import Literals
+from ig2mj.predicates.literals import NO_OBJECT, Literals
 from ig2mj.predicates.registry import find
 from ig2mj.states.model import StateModel
 
@@ -26,7 +26,7 @@ class GoalRows:
                 continue
             self._any |= not predicate.of_arguments
             for row in rows:
-                named.update(i for i, role in zip(row, predicate.arguments, strict=True) if role != "room")
+                named.update(i for i, role in zip(row, predicate.arguments, strict=True) if role not in NO_OBJECT)
         of_goal = np.isin(np.arange(tables.num_objects), list(named)) | tables.object_is_floor
         objects = np.flatnonzero(of_goal)
         bodies = np.union1d(

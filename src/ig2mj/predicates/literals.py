@@ -23,6 +23,7 @@ from ig2mj.errors import AbilityError, Ig2mjError, UnknownNameError
 from ig2mj.predicates.base import ANY_ROOM, Context, Predicate
 from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.registry import find
+from ig2mj.predicates.substances import substance_index
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query
 
@@ -132,7 +133,7 @@ class Literals:
             """The literal with `subject` as first argument; its second argument may have halves."""
             rest = literal.arguments[1:]
             value = facts[:, self.place[(literal.predicate.name, (subject, *rest))]]
-            if rest and roles[1] != "room" and (halves := parameters.halves_of(rest[0])):
+            if rest and roles[1] not in NO_OBJECT and (halves := parameters.halves_of(rest[0])):
                 of_half = [facts[:, self.place[(literal.predicate.name, (subject, h))]] for h in halves]
                 value = xp.where(sliced[:, rest[0]], xp.any(xp.stack(of_half), axis=0), value)
             return value
@@ -200,14 +201,22 @@ def object_or_agent_index(model: StateModel, name: str) -> int:
     return objects.index(name)
 
 
-INDEX = {"object": object_index, "room": room_index, "object or agent": object_or_agent_index}
+INDEX = {
+    "object": object_index,
+    "room": room_index,
+    "object or agent": object_or_agent_index,
+    "substance": substance_index,
+}
+
+NO_OBJECT = ("room", "substance")
+"""Roles of arguments that no object, and so no half, can have."""
 
 
 def _variants(model: StateModel, literal: Literal) -> list[tuple[int, ...]]:
     """The literal's arguments, then those with halves in the place of wholes."""
     choices = []
     for role, index in zip(literal.predicate.arguments, literal.arguments, strict=True):
-        halves = model.parameters.halves_of(index) if role != "room" else ()
+        halves = model.parameters.halves_of(index) if role not in NO_OBJECT else ()
         choices.append((index, *halves))
     if len(choices) == 1:
         return [(a,) for a in choices[0]]

@@ -6,8 +6,12 @@ from ig2mj.errors import StateError, UnknownNameError
 from ig2mj.plugins import Registry
 from ig2mj.predicates.base import Predicate
 from ig2mj.predicates.definitions.burnt import BURNT
+from ig2mj.predicates.definitions.contains import CONTAINS
 from ig2mj.predicates.definitions.cooked import COOKED
+from ig2mj.predicates.definitions.covered import COVERED
 from ig2mj.predicates.definitions.dusty import DUSTY
+from ig2mj.predicates.definitions.empty import EMPTY
+from ig2mj.predicates.definitions.filled import FILLED
 from ig2mj.predicates.definitions.frozen import FROZEN
 from ig2mj.predicates.definitions.in_contact_with import IN_CONTACT_WITH
 from ig2mj.predicates.definitions.in_fov_of_agent import IN_FOV_OF_AGENT
@@ -15,10 +19,12 @@ from ig2mj.predicates.definitions.in_hand_of_agent import IN_HAND_OF_AGENT
 from ig2mj.predicates.definitions.in_reach_of_agent import IN_REACH_OF_AGENT
 from ig2mj.predicates.definitions.in_same_room_as_agent import IN_SAME_ROOM_AS_AGENT
 from ig2mj.predicates.definitions.inside import INSIDE
+from ig2mj.predicates.definitions.insource import INSOURCE
 from ig2mj.predicates.definitions.next_to import NEXT_TO
 from ig2mj.predicates.definitions.on_floor import ON_FLOOR
 from ig2mj.predicates.definitions.on_top import ON_TOP
 from ig2mj.predicates.definitions.open import OPEN
+from ig2mj.predicates.definitions.saturated import SATURATED
 from ig2mj.predicates.definitions.sliced import SLICED
 from ig2mj.predicates.definitions.soaked import SOAKED
 from ig2mj.predicates.definitions.stained import STAINED
@@ -53,16 +59,21 @@ OWN: dict[str, Predicate] = {
 }
 """The 19 predicates of the paper's table A.1, under their snake_case names."""
 
+OF_SUBSTANCES: dict[str, Predicate] = {p.name: p for p in (COVERED, SATURATED, FILLED, CONTAINS, EMPTY, INSOURCE)}
+"""Predicates of what covers and fills objects (docs/guide/substances.md)."""
+
+SHIPPED: dict[str, Predicate] = {**OWN, **OF_SUBSTANCES}
+
 PREDICATES: Registry[Predicate] = Registry(
     "predicate",
     "an ig2mj.predicates.Predicate",
     lambda thing: isinstance(thing, Predicate),
-    OWN,
+    SHIPPED,
     words=lambda predicate: predicate.aliases,
 )
 """`OWN`, and those of plug-ins."""
 
-_ALIASES = {alias: p for p in OWN.values() for alias in p.aliases}
+_ALIASES = {alias: p for p in SHIPPED.values() for alias in p.aliases}
 
 
 def find_state(name: str) -> StateSpec:
@@ -82,7 +93,7 @@ def find(name: str) -> Predicate:
       UnknownNameError: there is none. PluginError: it is of a plug-in, which is at fault.
     """
     key = name.lower()
-    found = OWN.get(key) or _ALIASES.get(key) or PREDICATES.get(key)
+    found = SHIPPED.get(key) or _ALIASES.get(key) or PREDICATES.get(key)
     if found is None:
         added = PREDICATES.added().values()
         found = next((predicate for predicate in added if key in predicate.aliases), None)

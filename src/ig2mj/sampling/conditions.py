@@ -44,6 +44,14 @@ class Condition:
         return self.atom if self.value else Not(self.atom)
 
     @property
+    def objects(self) -> tuple[str, ...]:
+        """Its arguments without substances."""
+        roles = find(self.predicate).arguments
+        if len(roles) != len(self.arguments):  # an error that is reported where it is resolved
+            return self.arguments
+        return tuple(a for a, role in zip(self.arguments, roles, strict=True) if role != "substance")
+
+    @property
     def is_placement(self) -> bool:
         """It says where an object is."""
         return self.predicate in PLACEMENTS
@@ -101,7 +109,7 @@ def bind(conditions: Sequence[Condition], tables: SceneTables, rng: np.random.Ge
         if whole < 0
     ]
     used = {a for c in conditions for a in c.arguments if a in tables.object_names}
-    for name in dict.fromkeys(a for c in conditions for a in c.arguments):
+    for name in dict.fromkeys(a for c in conditions for a in c.objects):
         if name in bound or name in tables.object_names or name in tables.room_names or name in tables.agent_names:
             continue
         match = _NUMBERED.fullmatch(name)
@@ -115,7 +123,11 @@ def bind(conditions: Sequence[Condition], tables: SceneTables, rng: np.random.Ge
             raise StateError(f"the scene has too few objects of category '{category}' for '{name}'")
         bound[name] = free[int(rng.integers(len(free)))]
         used.add(bound[name])
-    return [dataclasses.replace(c, arguments=tuple(bound.get(a, a) for a in c.arguments)) for c in conditions]
+
+    def with_objects(c: Condition) -> tuple[str, ...]:
+        return tuple(bound.get(a, a) if a in c.objects else a for a in c.arguments)
+
+    return [dataclasses.replace(c, arguments=with_objects(c)) for c in conditions]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -271,9 +271,10 @@ class RowSampler:
         return self.holds(conditions, self._states)
 
     def _change(self, condition: Condition, rng: np.random.Generator) -> Change:
-        (name,) = condition.arguments
-        view = self.query.view
-        return set_by_name(self.model, self._states, view, condition.predicate, name, condition.value, rng)
+        name, *others = condition.arguments
+        wanted, view = condition.predicate, self.query.view
+        substance = others[0] if others else None
+        return set_by_name(self.model, self._states, view, wanted, name, condition.value, rng, substance)
 
     def _set(self, condition: Condition, rng: np.random.Generator) -> None:
         """Makes a condition of one object hold that needs neither place nor joints; halves take the whole's place."""

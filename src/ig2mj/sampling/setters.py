@@ -15,10 +15,13 @@ from jaxtyping import Bool
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import AbilityError, StateError, UnknownNameError
+from ig2mj.knowledge.substances import WATER
 from ig2mj.predicates.base import Predicate
 from ig2mj.predicates.literals import object_index
-from ig2mj.predicates.registry import OWN, PREDICATES
+from ig2mj.predicates.registry import PREDICATES, SHIPPED
 from ig2mj.predicates.registry import find as find_predicate
+from ig2mj.predicates.substances import substance_index
+from ig2mj.sampling.substance_setters import SUBSTANCE_SETTERS
 from ig2mj.sampling.surface_particles import sample_places
 from ig2mj.states import particles, registry
 from ig2mj.states.definitions import max_temperature, sliced, temperature, toggled_on, wetness
@@ -67,16 +70,18 @@ def set_by_name(
     object_name: str,
     value: Value,
     key: Randomness,
+    substance: str | None = None,
 ) -> Change:
     """Sets a state to a value, or a predicate of one object to a truth, in every world of `states`.
 
     Args:
       name: a state that is a number or a switch (`StateSpec.set`), or a predicate: cooked, burnt, frozen, soaked,
-        dusty, stained, toggled_on, open, sliced, or one of a plug-in (`Predicate.set`).
+        dusty, stained, toggled_on, open, sliced, those of substances, or one of a plug-in (`Predicate.set`).
       object_name: its halves are set alike.
       value: a finite number, or a truth.
       states: given as NumPy arrays, they stay that, and nothing is compiled (but for `sliced`).
       key: of what is drawn at random; a generator on the host.
+      substance: second argument of covered, saturated, filled, contains and insource.
 
     Raises:
       UnknownNameError: no such state, predicate or object. AbilityError: the object lacks the ability.
@@ -87,6 +92,10 @@ def set_by_name(
     mask = np.isin(np.arange(model.tables.num_objects), objects)[None]
     task = _Task(model, states, view, object_name, objects, mask, key)
     predicate = _predicate(name)
+    if predicate is not None and (predicate.name in SUBSTANCE_SETTERS or substance is not None):
+        if value not in (True, False):
+            raise StateError(f"predicate '{predicate.name}' is set to true or false, not to {value!r}")
+        return _of_substance(task, predicate, bool(value), substance)
     if predicate is not None and (setter := _SETTERS.get(predicate.name) or _setter_of(predicate)):
         if predicate.ability is not None and predicate.ability not in model.parameters.abilities[index]:
             raise AbilityError(lacks(f"predicate '{predicate.name}'", object_name, model, (str(predicate.ability),)))
@@ -109,10 +118,27 @@ def set_by_name(
     return Change(dataclasses.replace(states, **kind.set(states, mask, value)))
 
 
+def _of_substance(task: _Task, predicate: Predicate, value: bool, substance: str | None) -> Change:
+    if len(predicate.arguments) != 1 + (substance is not None):
+        raise StateError(f"predicate '{predicate.name}' takes an object{' and a substance' * (predicate.arity > 1)}")
+    if substance is not None:
+        substance_index(task.model, substance)  # refuses unknown ones
+    same = {("covered", DUST.name): "dusty", ("covered", STAIN.name): "stained", ("saturated", WATER): "soaked"}
+    if known := same.get((predicate.name, str(substance))):
+        ability = find_predicate(known).ability
+        if ability not in task.model.parameters.abilities[task.objects[0]]:
+            raise AbilityError(lacks(f"predicate '{predicate.name}'", task.object_name, task.model, (str(ability),)))
+        return _SETTERS[known](task, value)
+    states = task.states
+    for obj in task.objects if predicate.name in ("covered", "saturated") else task.objects[:1]:
+        states = SUBSTANCE_SETTERS[predicate.name](task.model, states, obj, substance, value)
+    return Change(states)
+
+
 def settable() -> list[str]:
     """Names that `set_by_name` takes."""
     own = [s.name for s in registry.STATES.values() if s.set is not None]
-    return [*own, *_SETTERS, *(p.name for p in PREDICATES.added().values() if p.set is not None)]
+    return [*own, *_SETTERS, *SUBSTANCE_SETTERS, *(p.name for p in PREDICATES.added().values() if p.set is not None)]
 
 
 def lacks(what: str, object_name: str, model: StateModel, abilities: tuple[str, ...]) -> str:
@@ -140,7 +166,7 @@ def _state(name: str) -> StateSpec:
         return registry.find(name)
     except UnknownNameError:
         if found := _predicate(name):
-            fix = "place the object instead" if found.name in OWN else "its plug-in gives it no `set`"
+            fix = "place the object instead" if found.name in SHIPPED else "its plug-in gives it no `set`"
             raise StateError(f"predicate '{found.name}' cannot be set by itself: {fix}") from None
         raise UnknownNameError("state or predicate", name, [*registry.STATES, *PREDICATES]) from None
 

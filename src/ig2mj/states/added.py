@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from ig2mj.plugins import Registry
 from ig2mj.states.spec import StateSpec
 
@@ -12,6 +14,19 @@ STATES: Registry[StateSpec] = Registry(
     words=lambda spec: (*spec.aliases, *(name for name in spec.fields if name != spec.name)),
 )
 """Every state of table A.4 of the paper, iGibson's others that can be asked, and those of plug-ins."""
+
+
+_OF_SUBSTANCES: list[StateSpec] = []
+
+
+def ship_substance_states(specs: Iterable[StateSpec]) -> None:
+    """Makes the states known that a scene with substances has, in the order of their updates."""
+    _OF_SUBSTANCES[:] = specs
+
+
+def substance_states() -> tuple[StateSpec, ...]:
+    """The states that a scene has that names substances, and no other scene (`ig2mj.states.substances`)."""
+    return tuple(_OF_SUBSTANCES)
 
 
 def added_states() -> tuple[StateSpec, ...]:

@@ -28,13 +28,16 @@ from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
 from ig2mj.states.spec import EventStep, HeatStep, StateSpec
-from ig2mj.states.update import heat_fields, queries
+from ig2mj.states.update import HEAT, heat_fields, queries
 
 SCENES = 8
 """Scenes whose findings are kept."""
 
 WORLDS = 2
 """W of the traced arrays: a mistaken shape [O] does not pass for [1, O]."""
+
+OWN_LATE = frozenset(name for spec in HEAT for name in spec.fields)
+"""Fields of ig2mj's own states of the second part, which change in most steps."""
 
 OWN = ("states", "drops", "cut_now", "swap")
 """What an update may change of a step."""
@@ -46,12 +49,16 @@ class AddedUpdates(NamedTuple):
     Attributes:
       reads: paths of the fields of the view (`ig2mj.engine.view.SCHEMA`). acts: names of states that change more than
         their own fields. whole: one of them reads or changes what only a whole step brings up to date.
+      late: fields of the second part that ones of the first read: a whole step follows where these have changed.
+      heat_reads_view: one of the second part reads the view.
       digest: hash of what all of them compute, as this version of JAX writes it; "" where there are none.
     """
 
     reads: frozenset[str] = frozenset()
     acts: tuple[str, ...] = ()
     whole: bool = False
+    late: frozenset[str] = frozenset()
+    heat_reads_view: bool = False
     digest: str = ""
 
     @staticmethod
@@ -69,15 +76,19 @@ class AddedUpdates(NamedTuple):
         if not updated:
             return AddedUpdates()
         found = [_traced(model, spec) for spec in updated]
-        late, acting, whole = set(heat_fields(model)), [], False
+        late, acting, whole, heat_reads_view, read_late = set(heat_fields(model)), [], False, False, set[str]()
         for spec, one in zip(updated, found, strict=True):
             if not one.changes <= set(spec.fields):
                 acting.append(spec.name)
-            reads_late = spec.part == "events" and not late.isdisjoint(one.states)
-            whole |= reads_late or (spec.part == "heat" and not one.changes <= late)
+            if spec.part == "events":
+                read_late |= late & one.states
+            else:
+                whole |= not one.changes <= late
+                heat_reads_view |= bool(one.view)
+        whole |= not read_late.isdisjoint(OWN_LATE)
         reads = frozenset[str]().union(*(one.view for one in found))
         digest = hashlib.blake2b("".join(one.text for one in found).encode(), digest_size=16).hexdigest()
-        return AddedUpdates(reads, tuple(acting), whole, digest)
+        return AddedUpdates(reads, tuple(acting), whole, frozenset(read_late), heat_reads_view, digest)
 
 
 class _Traced(NamedTuple):

@@ -10,31 +10,38 @@ from jaxtyping import Int
 
 from ig2mj.scene.manifest import Manifest
 from ig2mj.scene.tables import LinkKind, SceneTables
-from ig2mj.states.added import added_states
+from ig2mj.states.added import added_states, substance_states
 from ig2mj.states.options import StateOptions
 from ig2mj.states.parameters import StateParameters, parameters_of_manifest
 from ig2mj.states.spec import StateSpec
+from ig2mj.states.substances.model import SubstanceModel
 
 DEFAULTS = StateOptions()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StateModel:
-    """Constants of a scene's states: tables, parameters, options, and the states of plug-ins that it has.
+    """Constants of a scene's states: tables, parameters, options, and the states that not every scene has.
 
     Attributes:
-      added: states of plug-ins, in the order of their updates; by default all that are known now.
+      added: states of substances, where the scene has some, and those of plug-ins, in the order of their updates; by
+        default all that are known now. substances: of the scene; None: it names none.
     """
 
     tables: SceneTables
     parameters: StateParameters
     options: StateOptions = DEFAULTS
     added: tuple[StateSpec, ...] = dataclasses.field(default_factory=added_states)
+    substances: SubstanceModel | None = None
 
     @classmethod
     def of_manifest(cls, tables: SceneTables, manifest: Manifest, options: StateOptions = DEFAULTS) -> StateModel:
         """The model of a loaded scene."""
-        return cls(tables, parameters_of_manifest(manifest, tables, options.compat), options)
+        parameters = parameters_of_manifest(manifest, tables, options.compat)
+        if not manifest.substances:
+            return cls(tables, parameters, options)
+        substances = SubstanceModel.of_manifest(tables, manifest, parameters)
+        return cls(tables, parameters, options, (*substance_states(), *added_states()), substances)
 
     @property
     def paper(self) -> bool:

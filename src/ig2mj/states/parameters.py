@@ -37,7 +37,8 @@ class StateParameters:
 
     Attributes:
       abilities: of each object, {ability: {parameter: value}} (the taxonomy's names).
-      thermal: objects with a temperature: cookable, burnable or freezable (table A.2).
+      thermal: objects with a temperature: cookable, burnable or freezable (table A.2), and containers in a scene with
+        substances.
       cook_temperature, burn_temperature: Celsius, inf where the object lacks the ability. freeze_temperature: -inf.
       wetness_soaked: droplets. dusty_threshold, stained_threshold: fraction of particles. slice_force: newtons.
         open_fraction: part of a joint's range. All inf where the object lacks the ability.
@@ -94,7 +95,11 @@ def parameters_of_manifest(manifest: Manifest, tables: SceneTables, compat: Comp
     """The parameters of a scene as its manifest states them."""
     index = {name: i for i, name in enumerate(tables.object_names)}
     parts = [Part(index[o.name], index[p.object], p.pos, p.quat) for o in manifest.objects for p in o.parts]
-    return make_parameters(tables, [o.abilities for o in manifest.objects], parts, compat)
+    made = make_parameters(tables, [o.abilities for o in manifest.objects], parts, compat)
+    if not manifest.substances:
+        return made
+    holds = np.array([o.inside is not None for o in manifest.objects], bool)
+    return dataclasses.replace(made, thermal=made.thermal | holds)  # contents have the container's temperature
 
 
 def make_parameters(

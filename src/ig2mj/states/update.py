@@ -108,9 +108,10 @@ def events(
 
 
 def can_be_idle(model: StateModel) -> bool:
-    """Whether `idle` is ever true, and the second part then depends on nothing but temperatures and sources."""
+    """Whether `idle` is ever true, and ig2mj's own states of the second part then depend on nothing but temperatures
+    and sources. Those that are added may read the view (`AddedUpdates.heat_reads_view`)."""
     every = (*EVENTS, *_added(model, "events"))
-    return not model.options.contact_heat_rate and not _added(model, "heat") and all(s.idle is not None for s in every)
+    return not model.options.contact_heat_rate and all(s.idle is not None for s in every)
 
 
 @entry_point

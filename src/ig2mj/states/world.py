@@ -16,7 +16,7 @@ from jaxtyping import Float, Int, UInt
 
 from ig2mj.engine.view import Array, PhysicsView, counted, length
 from ig2mj.errors import PluginError, StateError
-from ig2mj.states.added import added_states
+from ig2mj.states.added import added_states, substance_states
 from ig2mj.states.registry import SPECS
 from ig2mj.states.spec import Cut, StateSpec
 from ig2mj.states.swap import Swap
@@ -30,7 +30,7 @@ else:
 
 
 class NewStateError(StateError, AttributeError):
-    """A state of a plug-in that was registered after the states of a scene were made."""
+    """A state that a scene does not have: of a plug-in that was registered later, or of substances."""
 
 
 @struct.dataclass
@@ -44,8 +44,10 @@ class ExtendedStates(_Fields):
     """
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") or name not in {field for spec in added_states() for field in spec.fields}:
+        if name.startswith("__") or name not in {field for spec in _others() for field in spec.fields}:
             raise AttributeError(f"states have no '{name}'")
+        if name in {field for spec in substance_states() for field in spec.fields}:
+            raise NewStateError(f"there is no '{name}': load the scene with substances=['water', ...]")
         raise NewStateError(f"state '{name}' was registered after these states were made: load the scene again")
 
     def inherited(self, cut: Cut) -> ExtendedStates:
@@ -59,6 +61,11 @@ class ExtendedStates(_Fields):
     def __repr__(self) -> str:
         temperature = getattr(self, "temperature", None)
         return counted(self, worlds=length(temperature), objects=length(temperature, 1))
+
+
+def _others() -> tuple[StateSpec, ...]:
+    """States that not every scene has."""
+    return (*substance_states(), *added_states())
 
 
 def states_class(added: Iterable[StateSpec]) -> type[ExtendedStates]:
@@ -94,7 +101,7 @@ def _reduced(states: ExtendedStates) -> tuple[Any, ...]:
 
 
 def _unreduced(added: list[str], values: Mapping[str, Any]) -> ExtendedStates:
-    known = {name: spec for spec in added_states() for name in spec.fields}
+    known = {name: spec for spec in _others() for name in spec.fields}
     if missing := [name for name in added if name not in known]:
         raise PluginError(f"state '{missing[0]}' is not registered in this process: register it where it starts")
     return states_class({known[name].name: known[name] for name in added}.values())(**values)

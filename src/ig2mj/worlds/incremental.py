@@ -19,8 +19,9 @@ engines, with the states and the view of each control step. Five facts decide wh
   the same, unless the states or the goal read what differs. Fingers count as the same while all are out of reach of all
   buttons.
 
-Updates of plug-ins' states are traced (`ig2mj.states.added_checks`). Where one reads temperatures in the first part, or
-changes other states in the second, every step is a whole one.
+Updates of added states are traced (`ig2mj.states.added_checks`). Where one reads temperatures in the first part, or
+changes other states in the second, every step is a whole one. Where one of the first part reads another added state of
+the second, a whole step follows each change of that.
 
 Axes: W worlds, O objects, S heat sources.
 """
@@ -108,6 +109,8 @@ class IncrementalRules:
                 self._leaves[place] = leaf
             states = jax.tree.unflatten(self._programs.structure, self._leaves)
             changed = [n for n, is_same in zip(self._programs.heat_names, same, strict=True) if not is_same]
+            if not self._programs.late_reads.isdisjoint(changed):
+                self._acts = None  # the next step is a whole one
             status = self._goal.after_heat(view, self._leaves, ahead, k, changed)
         self._last = Outcome(states, None, status)
         return self._last
@@ -187,7 +190,7 @@ class _StatePrograms:
     Attributes:
       structure: of the states, as a pytree. heat_places, heat_names: of the leaves that the second part changes, their
         places among the states' and the names of their fields. fingers_matter: also where they are out of reach of
-        buttons. tells_idle: `idle` is of use.
+        buttons. tells_idle: `idle` is of use. late_reads: fields that the second part changes and the first reads.
     """
 
     def __init__(self, model: StateModel, num_worlds: int):
@@ -197,7 +200,9 @@ class _StatePrograms:
         self.heat_places = [place for place, name in enumerate(names) if name in heat_fields(model)]
         self.heat_names = [names[place] for place in self.heat_places]
         self.fingers_matter = FINGERS in AddedUpdates.of(model).reads
-        self.tells_idle = can_be_idle(model) and not self.fingers_matter
+        added = AddedUpdates.of(model)
+        self.late_reads = added.late
+        self.tells_idle = can_be_idle(model) and not added.heat_reads_view and not self.fingers_matter
         self._step, self._heat = HostFunction(self._rules_fn), HostFunction(self._heat_fn)
         self._idle, self._acts = HostFunction(self._idle_fn), HostFunction(self._acts_fn)
         self._none_act = np.zeros((num_worlds, model.tables.num_objects, len(model.parameters.heat_object)), bool)

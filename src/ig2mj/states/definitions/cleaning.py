@@ -51,10 +51,10 @@ def update(
     """
     if len(model.parameters.tool_object) == 0 or len(rows) == 0:
         return particles
-    touching = meeting(model, particles, rows, can_clean, view)
+    meets = meeting(model, particles, rows, can_clean, view)
     alive = jax.lax.cond(
-        jnp.any(touching),
-        lambda: particles.alive & ~_wiped(model, particles, touching, view),
+        jnp.any(meets),
+        lambda: particles.alive & ~_wiped(model, particles, meets, view),
         lambda: particles.alive,
     )
     return dataclasses.replace(particles, alive=alive)
@@ -68,38 +68,49 @@ def meeting(
     view: PhysicsView,
 ) -> Bool[Array, "W T R"]:
     """Which tool touches which object that has particles left; arguments as of `update`."""
-    touching = _touching(model, view)[:, :, rows] & can_clean[..., None]
-    return touching & jnp.any(particles.alive, axis=-1)[:, None]
+    touched = touching(model, view)[:, :, rows] & can_clean[..., None]
+    return touched & jnp.any(particles.alive, axis=-1)[:, None]
 
 
 def _wiped(
-    model: StateModel, particles: Particles, touching: Bool[Array, "W T R"], view: PhysicsView
+    model: StateModel, particles: Particles, meets: Bool[Array, "W T R"], view: PhysicsView
 ) -> Bool[Array, "W R N"]:
     low, high = regions(model, view)
     pos = world_positions(particles, view)
     wiped = jnp.zeros(particles.alive.shape, bool)
-    for tool in range(touching.shape[1]):
-        in_region = jnp.all((low[:, tool, None, None] <= pos) & (pos <= high[:, tool, None, None]), axis=-1)
-        wiped |= in_region & touching[:, tool, :, None]
+    for tool in range(meets.shape[1]):
+        wiped |= _in_region(low[:, tool], high[:, tool], pos) & meets[:, tool, :, None]
     return wiped
 
 
-def _touching(model: StateModel, view: PhysicsView) -> Bool[Array, "W T O"]:
+def within(model: StateModel, pos: Float[Array, "W R N 3"], view: PhysicsView) -> Bool[Array, "W T R N"]:
+    """Which points (m, world frame) are in the area in which each tool cleans."""
+    low, high = regions(model, view)
+    return jnp.stack([_in_region(low[:, t], high[:, t], pos) for t in range(low.shape[1])], axis=1)
+
+
+def _in_region(
+    low: Float[Array, "W 3"], high: Float[Array, "W 3"], pos: Float[Array, "W R N 3"]
+) -> Bool[Array, "W R N"]:
+    return jnp.all((low[:, None, None] <= pos) & (pos <= high[:, None, None]), axis=-1)
+
+
+def touching(model: StateModel, view: PhysicsView) -> Bool[Array, "W T O"]:
     """What each tool touches with the part that cleans.
 
     The view tells which contacts a link has by their force. A tool that sleeps has none, but what it touched before it
     fell asleep is remembered for the whole tool, and counts: water can still soak it and let it take a stain.
     """
     p, links = model.parameters, model.tables.link_geom
-    touching = jnp.asarray(view.touching)[:, p.tool_object]
+    touched = jnp.asarray(view.touching)[:, p.tool_object]
     if len(links) == 0:
-        return touching
+        return touched
     link = np.maximum(p.tool_link, 0)
     by_area = (p.tool_link >= 0) & (links[link] >= 0)
     if not by_area.any():
-        return touching
+        return touched
     pressing = (jnp.asarray(view.link_force)[:, link] > 0) | ~jnp.asarray(view.awake)[:, p.tool_object, None]
-    return touching & (pressing | ~by_area[:, None])
+    return touched & (pressing | ~by_area[:, None])
 
 
 def regions(model: StateModel, view: PhysicsView) -> tuple[Float[Array, "W T 3"], Float[Array, "W T 3"]]:

@@ -26,6 +26,7 @@ from ig2mj.errors import EngineError, StateError
 from ig2mj.predicates.cheapest import cheapest
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.readings import Reading, readings
+from ig2mj.predicates.registry import OF_SUBSTANCES
 from ig2mj.process import entry_point
 from ig2mj.sampling.conditions import MUTUAL, Condition
 from ig2mj.sampling.many import Sampled, make_sampler, packed_row, sample_row, sampled_rows
@@ -282,7 +283,7 @@ def choose_reading(
         return sorted(shuffled, key=lambda e: cheapest(e, changes, value)[0])
 
     def possible(chosen: Mapping[Atom, bool], atom: Atom, value: bool) -> bool:
-        if truth[atom] == value or len(atom.arguments) == 1:
+        if truth[atom] == value or len(atom.arguments) == 1 or atom.predicate in OF_SUBSTANCES:
             return True
         first, second = atom.arguments
         return first != second and (first not in fixed or (atom.predicate in MUTUAL and second not in fixed))

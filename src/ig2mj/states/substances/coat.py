@@ -1,0 +1,264 @@
+"""What covers objects, and what they have absorbed. Dust and stains have rows of particles of their own.
+
+A substance covers points of an object: the same 20 points for all. A stream covers the points near the place where it
+meets an object, and a soakable object absorbs it. A cleaning tool that touches an object wipes off the points in its
+area, as it does with dust (`ig2mj.states.definitions.cleaning`), of the substances that it can remove now; it absorbs
+what it wipes off.
+
+Axes: W worlds, D objects that can be covered, U substances, N = 20 points, T tools, K streams, O objects.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, UInt32
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import quat_rotate
+from ig2mj.states.definitions import cleaning, wetness
+from ig2mj.states.model import StateModel
+from ig2mj.states.spec import Cut, EventStep, Saved, StateSpec
+from ig2mj.states.substances.model import NUM_POINTS, of
+from ig2mj.states.substances.streams import Landed
+
+if TYPE_CHECKING:
+    from ig2mj.states.world import ExtendedStates
+
+DROP = 4.19e-3
+"""Litres of a drop, a ball of 1 cm radius (iGibson's object_states): what soaks."""
+
+NEAR = 0.08
+"""m around the place where a stream meets an object: points that it covers. Where none is so near, the nearest is."""
+
+ALL = np.uint32((1 << NUM_POINTS) - 1)
+"""Every point."""
+
+BITS = (np.uint32(1) << np.arange(NUM_POINTS, dtype=np.uint32)).astype(np.uint32)
+
+
+def covered(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O U"]:
+    """Whether at least one point of each object is covered by each substance (OmniGibson's covered.py)."""
+    none = jnp.zeros((states.coat.shape[0], 1, states.coat.shape[2]), bool)
+    return jnp.concatenate([jnp.asarray(states.coat) > 0, none], axis=1)[:, of(model).row]
+
+
+def saturated(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O U"]:
+    """Whether each object has absorbed as much of each substance as it takes to be soaked; of water, whether it is."""
+    found, p = of(model), model.parameters
+    least = np.where(np.isfinite(p.wetness_soaked), p.wetness_soaked, np.where(p.has("cleaningTool"), 1.0, np.inf))
+    none = jnp.zeros((states.absorbed.shape[0], 1, states.absorbed.shape[2]))
+    drops = jnp.concatenate([jnp.asarray(states.absorbed), none], axis=1)[:, found.row]
+    enough = drops >= least.astype(np.float32)[:, None]
+    soaked = wetness.soaked(model, states.wetness)[..., None]
+    return jnp.where(np.arange(len(found.names)) == found.water, soaked, enough)
+
+
+def positions(model: StateModel, view: PhysicsView) -> Float[Array, "W D N 3"]:
+    """Where the points are, m, world frame."""
+    found = of(model)
+    pos, quat = jnp.asarray(view.body_pos)[:, found.body], jnp.asarray(view.body_quat)[:, found.body]
+    return pos + quat_rotate(quat, found.pos)
+
+
+def normals(model: StateModel, view: PhysicsView) -> Float[Array, "W D N 3"]:
+    """Unit, outwards, world frame."""
+    found = of(model)
+    return quat_rotate(jnp.asarray(view.body_quat)[:, found.body], found.normal)
+
+
+def as_points(coat: UInt32[Array, "*b"]) -> Bool[Array, "*b N"]:
+    """Which points each substance covers."""
+    return (jnp.asarray(coat)[..., None] & BITS) > 0
+
+
+def as_bits(points: Bool[Array, "*b N"]) -> UInt32[Array, "*b"]:
+    """The inverse of `as_points`."""
+    return jnp.sum(jnp.where(points, BITS, np.uint32(0)), axis=-1, dtype=jnp.uint32)
+
+
+def spilled(
+    model: StateModel,
+    states: ExtendedStates,
+    amounts: Float[Array, "W K U"],
+    landed: Landed,
+    by_taps: Bool[Array, "W K"],
+    view: PhysicsView,
+) -> ExtendedStates:
+    """The states after streams met objects.
+
+    Args:
+      amounts: litres of each stream that met one. by_taps: streams of taps, which do not soak: their drops do.
+    """
+    found, p = of(model), model.parameters
+    soakable = np.isfinite(p.wetness_soaked)
+    soaking = jnp.where(by_taps[..., None], 0.0, amounts) / DROP
+    drops = jnp.sum(jnp.where((landed.object & soakable)[..., None], soaking[:, :, None], 0.0), axis=1)  # [W, O, U]
+    water = drops[..., found.water] if found.water >= 0 else jnp.zeros(drops.shape[:2])
+    if model.paper:
+        wet = states.wetness + water
+    else:
+        wet = jnp.where(
+            water > 0, jnp.maximum(states.wetness, np.where(soakable, p.wetness_soaked, 0.0)), states.wetness
+        )
+    drains = p.has("waterSink")
+    onto = jnp.any(amounts > 0, axis=-1)[..., None] & landed.object & ~drains & ~soakable  # [W, K, O]
+    coat = jax.lax.cond(
+        jnp.any(onto),
+        lambda: _covered_by(model, states.coat, amounts, landed, onto, view),
+        lambda: jnp.asarray(states.coat),
+    )
+    own = np.arange(len(found.names)) != found.water
+    absorbed = states.absorbed + jnp.where(own, drops[:, found.covered], 0.0)
+    return dataclasses.replace(states, wetness=wet, coat=coat, absorbed=absorbed)
+
+
+def _covered_by(
+    model: StateModel,
+    coat: UInt32[Array, "W D U"],
+    amounts: Float[Array, "W K U"],
+    landed: Landed,
+    onto: Bool[Array, "W K O"],
+    view: PhysicsView,
+) -> UInt32[Array, "W D U"]:
+    pos = positions(model, view)
+    new = jnp.asarray(coat)
+    for k in range(amounts.shape[1]):
+        offset = pos - landed.pos[:, k, None, None]
+        distance = jnp.sum(offset * offset, axis=-1)
+        near = (distance <= NEAR**2) | (distance <= jnp.min(distance, axis=-1, keepdims=True))
+        bits = jnp.where(onto[:, k, of(model).covered], as_bits(near), np.uint32(0))
+        new = new | jnp.where((amounts[:, k] > 0)[:, None], bits[..., None], np.uint32(0))
+    return new
+
+
+def can_remove(step: EventStep) -> Bool[Array, "W T U"]:
+    """Which tool can remove which substance now."""
+    model, states = step.model, step.states
+    found, tools = of(model), model.parameters.tool_object
+    full = saturated(model, states)[:, tools]  # [W, T, U]
+    by = jnp.any(full[:, :, None] & found.cleaners, axis=-1)
+    soaked = wetness.soaked(model, states.wetness)[:, tools]
+    able = by | found.dry | (found.wet & soaked[..., None])
+    return able & cleaning.working(model, states.toggled_on)[..., None]
+
+
+def _meeting(step: EventStep) -> Bool[Array, "W T D U"]:
+    touching = cleaning.touching(step.model, step.view)[:, :, of(step.model).covered]
+    return (touching[..., None] & can_remove(step)[:, :, None]) & (jnp.asarray(step.states.coat) > 0)[:, None]
+
+
+def update(step: EventStep) -> EventStep:
+    """One control step of all cleaning tools."""
+    model = step.model
+    if not len(model.parameters.tool_object) or not len(of(model).covered) or not len(of(model).names):
+        return step
+    meeting = _meeting(step)
+    states = jax.lax.cond(jnp.any(meeting), lambda: _wiped(step, meeting), lambda: _fields(step.states))
+    return step.having(**states)
+
+
+def _fields(states: ExtendedStates) -> dict[str, Array]:
+    return {name: jnp.asarray(getattr(states, name)) for name in ("coat", "absorbed", "wetness")}
+
+
+def _wiped(step: EventStep, meeting: Bool[Array, "W T D U"]) -> dict[str, Array]:
+    model, states = step.model, step.states
+    found, tools = of(model), model.parameters.tool_object
+    within = as_bits(cleaning.within(model, positions(model, step.view), step.view))  # [W, T, D]
+    taken = jnp.where(meeting, within[..., None] & jnp.asarray(states.coat)[:, None], np.uint32(0))
+    coat = jnp.asarray(states.coat)
+    for tool in range(len(tools)):
+        coat = coat & ~taken[:, tool]
+    drops = jnp.sum(as_points(taken), axis=(2, 4))  # [W, T, U]
+    drops = jnp.where(found.has_volume, drops, 0).astype(jnp.float32)
+    rows = found.row[tools]
+    of_row = (rows[:, None] == np.arange(len(found.covered)))[None, :, :, None]
+    own = np.arange(len(found.names)) != found.water
+    absorbed = states.absorbed + jnp.sum(jnp.where(of_row & own, drops[:, :, None], 0.0), axis=1)
+    wet = jnp.asarray(states.wetness)
+    if found.water >= 0:
+        of_object = (tools[:, None] == np.arange(model.tables.num_objects))[None]
+        soakable = np.isfinite(model.parameters.wetness_soaked)
+        wet = wet + jnp.sum(jnp.where(of_object & soakable, drops[..., found.water, None], 0.0), axis=1)
+    return {"coat": coat, "absorbed": absorbed, "wetness": wet}
+
+
+def idle(step: EventStep) -> Bool[Array, ""]:
+    """No tool meets what it can remove."""
+    if not len(step.model.parameters.tool_object) or not len(of(step.model).covered):
+        return jnp.array(True)
+    return ~jnp.any(_meeting(step))
+
+
+def set_covered(model: StateModel, states: ExtendedStates, obj: int, name: str, value: bool) -> ExtendedStates:
+    """The states with all points of an object covered, or none, in every world; NumPy arrays stay that."""
+    return _put(model, states, "coat", obj, name, ALL if value else np.uint32(0))
+
+
+def set_saturated(model: StateModel, states: ExtendedStates, obj: int, name: str, value: bool) -> ExtendedStates:
+    """The states with an object that has absorbed as much as it takes, or nothing. Water: see `wetness.set_soaked`."""
+    soaked = model.parameters.wetness_soaked[obj]
+    least = float(soaked) if np.isfinite(soaked) else 1.0
+    return _put(model, states, "absorbed", obj, name, np.float32(least if value else 0.0))
+
+
+def _put(model: StateModel, states: ExtendedStates, field: str, obj: int, name: str, value: Any) -> ExtendedStates:
+    found = of(model)
+    own = (np.arange(len(found.covered)) == found.row[obj])[:, None] & (
+        np.arange(len(found.names)) == found.names.index(name)
+    )
+    array = getattr(states, field)
+    xp: Any = np if isinstance(array, np.ndarray) else jnp
+    return dataclasses.replace(states, **{field: xp.where(own, value, array).astype(array.dtype)})
+
+
+def _initial(model: StateModel) -> dict[str, np.ndarray]:
+    shape = (1, len(of(model).covered), len(of(model).names))
+    return {"coat": np.zeros(shape, np.uint32), "absorbed": np.zeros(shape, np.float32)}
+
+
+def _inherit(states: ExtendedStates, cut: Cut) -> dict[str, Array]:
+    """Halves take over what covers their whole, at the same points, and what it has absorbed."""
+    found = of(cut.model)
+    source = found.row[cut.source[found.covered]]
+    source = np.where(source < len(found.covered), source, np.arange(len(found.covered)))
+    takes = jnp.asarray(cut.takes)[:, found.covered][..., None]
+    return {
+        n: jnp.where(takes, jnp.asarray(x)[:, source], x)
+        for n, x in (("coat", states.coat), ("absorbed", states.absorbed))
+    }
+
+
+def _from_manifest(saved: Saved) -> None:
+    """From "covered", {substance: 20 bits}, and "absorbed", {substance: drops}."""
+    found = of(saved.model)
+    row = found.row[saved.obj]
+    for key, field in (("covered", "coat"), ("absorbed", "absorbed")):
+        for name, value in saved.values.get(key, {}).items():
+            if name in found.names and row < len(found.covered):
+                getattr(saved.states, field)[0, row, found.names.index(name)] = value
+
+
+def _get(model: StateModel, states: ExtendedStates, view: PhysicsView, obj: int, world: int) -> str:
+    found, row = of(model), of(model).row[obj]
+    if row == len(found.covered):
+        return ""
+    return ", ".join(n for n, bits in zip(found.names, np.asarray(states.coat)[world, row], strict=True) if bits)
+
+
+SPEC = StateSpec(
+    name="coat",
+    get=_get,
+    abilities=None,
+    fields={"coat": UInt32[Array, "W D U"], "absorbed": Float[Array, "W D U"]},
+    initial=_initial,
+    update=update,
+    idle=idle,
+    inherit=_inherit,
+    from_manifest=_from_manifest,
+)

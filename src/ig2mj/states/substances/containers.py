@@ -1,0 +1,176 @@
+"""Containers: what stays in at each tilt, and where the rest flows out.
+
+Axes: C containers, U substances, R = 8 corners of a rim, A tilts, B directions, W worlds.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import quat_rotate, quat_rotate_inverse
+from ig2mj.scene.manifest import InsideEntry, Manifest
+from ig2mj.scene.tables import SceneTables
+
+TILTS, DIRECTIONS, CORNERS = 19, 8, 8
+"""Rows and columns of `Containers.capacity`: tilts from 0 to 180 degrees, directions of it about the opening's axis;
+and corners that every rim has."""
+
+FINENESS = 18
+"""Points along each edge of the box of an inside with which its volumes are measured."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Containers:
+    """The containers of a scene; lengths in m in the frame of the container's main body.
+
+    Attributes:
+      object, body: of each. litres: what it holds when its opening faces up.
+      rim: corners of the opening, in order. centre: their mean. normal: unit, out of the opening. side: unit, in the
+        plane of the opening, from which directions are counted.
+      capacity: litres that stay in, by tilt and direction. drains: it has a drain.
+    """
+
+    object: Int[np.ndarray, "C"]
+    body: Int[np.ndarray, "C"]
+    litres: Float[np.ndarray, "C"]
+    rim: Float[np.ndarray, "C R 3"]
+    centre: Float[np.ndarray, "C 3"]
+    normal: Float[np.ndarray, "C 3"]
+    side: Float[np.ndarray, "C 3"]
+    capacity: Float[np.ndarray, "C A B"]
+    drains: Bool[np.ndarray, "C"]
+
+    @classmethod
+    def of_manifest(cls, tables: SceneTables, manifest: Manifest, drains: Bool[np.ndarray, "O"]) -> Containers:
+        """Those of a scene: objects with an inside. `drains`: objects with a drain."""
+        found = [(o, e.inside) for o, e in enumerate(manifest.objects) if e.inside is not None]
+        objects = np.array([o for o, _ in found], int)
+        shapes: dict[bytes, _Shape] = {}
+        rows = []
+        for _, inside in found:
+            key = np.array([*inside.vertices, *inside.rim]).tobytes()
+            if key not in shapes:
+                shapes[key] = _shape(inside)
+            rows.append(shapes[key])
+        return cls(
+            object=objects,
+            body=tables.object_root[objects],
+            litres=np.array([inside.litres for _, inside in found], np.float32),
+            rim=_stacked([r.rim for r in rows], (CORNERS, 3)),
+            centre=_stacked([r.rim.mean(0) for r in rows], (3,)),
+            normal=_stacked([r.normal for r in rows], (3,)),
+            side=_stacked([r.side for r in rows], (3,)),
+            capacity=_stacked([r.capacity for r in rows], (TILTS, DIRECTIONS)),
+            drains=drains[objects],
+        )
+
+    def row_of(self, obj: int) -> int | None:
+        """The row of an object; None: it is no container."""
+        found = np.flatnonzero(self.object == obj)
+        return int(found[0]) if len(found) else None
+
+    def holds(self, view: PhysicsView) -> Float[Array, "W C"]:
+        """Litres that stay in each container as it stands."""
+        up = quat_rotate_inverse(jnp.asarray(view.body_quat)[:, self.body], np.array([0.0, 0.0, 1.0], np.float32))
+        along = jnp.sum(up * self.normal, axis=-1)
+        across = jnp.cross(self.normal, self.side)
+        x, y = jnp.sum(up * self.side, axis=-1), jnp.sum(up * across, axis=-1)
+        tilt = jnp.arctan2(jnp.sqrt(x * x + y * y), along) * ((TILTS - 1) / np.pi)
+        turn = jnp.mod(jnp.arctan2(y, x) * (DIRECTIONS / (2 * np.pi)), DIRECTIONS)
+        row = jnp.clip(jnp.floor(tilt), 0, TILTS - 2).astype(int)
+        column = jnp.clip(jnp.floor(turn), 0, DIRECTIONS - 1).astype(int)
+        table, own = self.capacity.reshape(len(self.body), -1), np.arange(len(self.body))
+        parts = []
+        for beside in (0, 1):
+            place = jnp.mod(column + beside, DIRECTIONS)
+            low, high = (jnp.asarray(table)[own, (row + step) * DIRECTIONS + place] for step in (0, 1))
+            parts.append(low + (tilt - row) * (high - low))
+        return parts[0] + (turn - column) * (parts[1] - parts[0])
+
+    def openings(self, view: PhysicsView) -> Openings:
+        """Where the openings are."""
+        pos, quat = (jnp.asarray(field)[:, self.body] for field in (view.body_pos, view.body_quat))
+        rim = pos[:, :, None] + quat_rotate(quat[:, :, None], self.rim)
+        return Openings(rim, pos + quat_rotate(quat, self.centre), quat_rotate(quat, self.normal))
+
+
+class Openings(NamedTuple):
+    """World frame, m: corners of the rims, their means, and unit normals that point out."""
+
+    rim: Float[Array, "W C R 3"]
+    centre: Float[Array, "W C 3"]
+    normal: Float[Array, "W C 3"]
+
+    def lowest(self) -> Float[Array, "W C 3"]:
+        """The lowest corner of each rim."""
+        height = self.rim[..., 2]
+        first = jnp.argmin(height, axis=-1)[..., None] == np.arange(height.shape[-1])
+        return jnp.sum(jnp.where(first[..., None], self.rim, 0.0), axis=2)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Shape:
+    rim: Float[np.ndarray, "R 3"]
+    normal: Float[np.ndarray, "3"]
+    side: Float[np.ndarray, "3"]
+    capacity: Float[np.ndarray, "A B"]
+
+
+def _shape(inside: InsideEntry) -> _Shape:
+    rim = np.array(inside.rim, float)
+    centre = rim.mean(0)
+    product = np.cross(rim - centre, np.roll(rim, -1, axis=0) - centre).sum(0)
+    normal = product / np.linalg.norm(product)
+    if normal @ (centre - np.mean(inside.vertices, axis=0)) < 0:
+        normal, rim = -normal, rim[::-1]
+    side = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    side -= normal * (side @ normal)
+    side /= np.linalg.norm(side)
+    return _Shape(_with_corners(rim), normal, side, _capacity(inside, rim, normal, side))
+
+
+def _with_corners(rim: Float[np.ndarray, "M 3"]) -> Float[np.ndarray, "R 3"]:
+    """A rim with `CORNERS` corners: the first is repeated, or some are left out."""
+    if len(rim) <= CORNERS:
+        return np.concatenate([rim, np.repeat(rim[:1], CORNERS - len(rim), axis=0)])
+    return rim[np.linspace(0, len(rim), CORNERS, endpoint=False).astype(int)]
+
+
+def _capacity(
+    inside: InsideEntry, rim: Float[np.ndarray, "M 3"], normal: Float[np.ndarray, "3"], side: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "A B"]:
+    """Litres below the lowest corner of the rim, by tilt and direction."""
+    points = _filling(np.array(inside.vertices, float))
+    tilt = np.linspace(0, np.pi, TILTS)[:, None, None]
+    turn = (np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS))[None, :, None]
+    across = np.cross(normal, side)
+    up = np.cos(tilt) * normal + np.sin(tilt) * (np.cos(turn) * side + np.sin(turn) * across)
+    level = (up @ rim.T).min(-1)
+    share = ((up @ points.T) <= level[..., None] + 1e-9).mean(-1)
+    share[0] = 1.0
+    return (inside.litres * share).astype(np.float32)
+
+
+def _filling(vertices: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "P 3"]:
+    """Points spread evenly over a convex body."""
+    import scipy.spatial  # takes as long as all of this package
+
+    low, high = vertices.min(0), vertices.max(0)
+    axes = [np.linspace(a, b, FINENESS + 1)[1:] - (b - a) / (2 * FINENESS) for a, b in zip(low, high, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    try:
+        planes = scipy.spatial.ConvexHull(vertices).equations
+    except scipy.spatial.QhullError:
+        return grid
+    return grid[np.all(grid @ planes[:, :3].T + planes[:, 3] <= 1e-9, axis=1)]
+
+
+def _stacked(rows: Sequence[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
+    return np.array(rows, np.float32).reshape(-1, *shape)

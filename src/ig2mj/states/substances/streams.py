@@ -1,0 +1,171 @@
+"""Where what flows out of containers and taps falls: into an opening, onto an object, or nowhere.
+
+A stream leaves a rim outwards and falls. Its way is a parabola in three pieces, each a straight fall at the middle of
+its piece (`ig2mj.geometry.targets.fall_contact`). The first opening that faces upwards or the first object decides. The
+object that it comes from is not in its way.
+
+Axes: W worlds, K streams, S = 3 pieces of the way, C containers, O objects, R corners of a rim, B bodies.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import quat_rotate_inverse
+from ig2mj.geometry.targets import RayTargets, fall_contact
+from ig2mj.scene.tables import SceneTables
+from ig2mj.states.relations.worklist import Worklist
+from ig2mj.states.substances.containers import Containers, Openings
+
+MOST = 4
+"""Streams that fall at a time in a world."""
+
+GRAVITY = 9.8
+"""m/s^2."""
+
+SPEED = 0.2
+"""m/s outwards with which a stream leaves a rim."""
+
+LIP = 0.008
+"""m outwards from the lowest corner of the rim at which it begins to fall."""
+
+TIMES = (0.0, 0.1, 0.25)
+"""s at which the pieces of the way begin."""
+
+FALL = 3.0
+"""m down to which a stream is followed."""
+
+UPWARDS = 0.3
+"""Least z of the normal of an opening that takes a stream."""
+
+SLACK = 0.005
+"""m by which an opening may lie below an object's surface and still be met first: the edge of its own rim."""
+
+WORLDS_AT_ONCE = 256
+"""Worlds whose streams are followed together: of a larger batch only those in which something flows."""
+
+
+class Falling(NamedTuple):
+    """What streams depend on.
+
+    Attributes:
+      active: there is a stream. start: m, world. aside: unit vector outwards, or 0 for a tap. source: container that it
+        comes from. origin: object that it comes from.
+    """
+
+    active: Bool[Array, "W K"]
+    start: Float[Array, "W K 3"]
+    aside: Float[Array, "W K 2"]
+    source: Bool[Array, "W K C"]
+    origin: Bool[Array, "W K O"]
+    openings: Openings
+    body_pos: Float[Array, "W B 3"]
+    body_quat: Float[Array, "W B 4"]
+
+
+class Landed(NamedTuple):
+    """Where streams end: in a container, or on an object at a place (m, world); neither: nowhere."""
+
+    container: Bool[Array, "W K C"]
+    object: Bool[Array, "W K O"]
+    pos: Float[Array, "W K 3"]
+
+
+def land(tables: SceneTables, containers: Containers, falling: Falling) -> Landed:
+    """Follows the streams of all worlds."""
+    num_worlds = falling.active.shape[0]
+    nowhere = Landed(jnp.zeros(falling.source.shape, bool), jnp.zeros(falling.origin.shape, bool), falling.start)
+    flowing = jnp.any(falling.active, axis=1)
+    if num_worlds <= WORLDS_AT_ONCE:
+        return jax.lax.cond(jnp.any(flowing), lambda: _followed(tables, containers, falling), lambda: nowhere)
+    listed = Worklist.of(flowing, WORLDS_AT_ONCE)
+
+    def some(turn: Int[jax.Array, ""], done: Landed) -> Landed:
+        worlds = listed.places(turn * WORLDS_AT_ONCE)  # beyond the last: `num_worlds`, which reads any and writes none
+        own = jax.tree.map(lambda a: jnp.asarray(a)[jnp.minimum(worlds, num_worlds - 1)], falling)
+        found = _followed(tables, containers, own)
+        return jax.tree.map(lambda a, b: a.at[worlds].set(b, mode="drop"), done, found)
+
+    turns = (jnp.sum(flowing) + WORLDS_AT_ONCE - 1) // WORLDS_AT_ONCE
+    return jax.lax.fori_loop(0, turns, some, jax.tree.map(jnp.asarray, nowhere))
+
+
+def falling_from(
+    active: Bool[Array, "W K"],
+    start: Float[Array, "W K 3"],
+    aside: Float[Array, "W K 2"],
+    source: Bool[Array, "W K C"],
+    origin: Bool[Array, "W K O"],
+    openings: Openings,
+    view: PhysicsView,
+) -> Falling:
+    """Streams in a view."""
+    return Falling(
+        active, start, aside, source, origin, openings, jnp.asarray(view.body_pos), jnp.asarray(view.body_quat)
+    )
+
+
+def _followed(tables: SceneTables, containers: Containers, falling: Falling) -> Landed:
+    num_worlds = falling.active.shape[0]
+    depths = np.array([GRAVITY / 2 * t * t for t in TIMES] + [FALL], np.float32)
+    middles = np.array([0.5 * (a + b) for a, b in zip(TIMES, (*TIMES[1:], TIMES[-1]), strict=True)], np.float32)
+    out = (LIP + SPEED * middles)[:, None] * falling.aside[:, :, None, :]
+    pos = jnp.concatenate(
+        [falling.start[:, :, None, :2] + out, falling.start[:, :, None, 2:] - depths[:-1, None]], axis=-1
+    )  # [W, K, S, 3]
+    lengths = jnp.broadcast_to(jnp.asarray(np.diff(depths)), pos.shape[:-1])
+    objects = np.arange(tables.num_objects)
+    reach = fall_contact(
+        RayTargets.build(tables, objects),
+        falling.body_pos,
+        falling.body_quat,
+        pos.reshape(num_worlds, -1, 3),
+        lengths.reshape(num_worlds, -1),
+    ).reshape(*pos.shape[:3], -1)
+    reach = jnp.where(falling.origin[:, :, None], jnp.inf, reach + depths[:-1, None])
+    solid = jnp.min(reach, axis=2)  # [W, K, O]
+    opening = _openings_met(containers, falling, pos, lengths, depths)  # [W, K, C]
+    first_object, first_opening = jnp.min(solid, axis=-1), jnp.min(opening, axis=-1, initial=jnp.inf)
+    enters = falling.active & jnp.isfinite(first_opening) & (first_opening <= first_object + SLACK)
+    meets = falling.active & ~enters & jnp.isfinite(first_object)
+    own = np.arange(opening.shape[-1])
+    into = enters[..., None] & (jnp.argmin(opening, axis=-1)[..., None] == own) if len(own) else falling.source
+    onto = meets[..., None] & (jnp.argmin(solid, axis=-1)[..., None] == objects)
+    depth = jnp.where(meets, first_object, 0.0)
+    piece = jnp.sum(depth[..., None] >= depths[1:-1], axis=-1)[..., None] == np.arange(len(TIMES))
+    aside = jnp.sum(jnp.where(piece[..., None], pos[..., :2], 0.0), axis=2)
+    place = jnp.concatenate([aside, falling.start[..., 2:] - depth[..., None]], axis=-1)
+    return Landed(into, onto, place)
+
+
+def _openings_met(
+    containers: Containers,
+    falling: Falling,
+    pos: Float[Array, "W K S 3"],
+    lengths: Float[Array, "W K S"],
+    depths: Float[np.ndarray, "S1"],
+) -> Float[Array, "W K C"]:
+    """How deep each stream has fallen where it enters each opening; inf: it does not."""
+    if not len(containers.body):
+        return jnp.zeros((*pos.shape[:2], 0))
+    centre, normal = falling.openings.centre[:, None, None], falling.openings.normal[:, None, None]  # [W, 1, 1, C, 3]
+    at = pos[:, :, :, None]
+    faces = normal[..., 2] > UPWARDS
+    offset = at - centre
+    below = jnp.sum(offset * normal, axis=-1) / jnp.where(faces, normal[..., 2], 1.0)  # how far down the plane is
+    crosses = faces & (below >= -1e-6) & (below <= lengths[..., None])
+    hit = offset - below[..., None] * np.array([0.0, 0.0, 1.0], np.float32)  # from the centre, world axes
+    quat = falling.body_quat[:, containers.body][:, None, None]
+    local = quat_rotate_inverse(quat, hit)
+    corners = containers.rim - containers.centre[:, None]  # [C, R, 3]
+    edges = np.roll(corners, -1, axis=1) - corners
+    outwards = np.cross(edges, np.broadcast_to(containers.normal[:, None], edges.shape))
+    beyond = jnp.einsum("wkscx,crx->wkscr", local, outwards) - np.sum(corners * outwards, axis=-1)
+    inside = jnp.all(beyond <= 1e-9, axis=-1) & crosses & ~falling.source[:, :, None]
+    return jnp.min(jnp.where(inside, below + depths[:-1, None], jnp.inf), axis=2)
