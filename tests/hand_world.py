@@ -18,6 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ig2mj.engine.view import SCHEMA, PhysicsView, axis_sizes, blank_view, faults, replace_fields
+from ig2mj.scene.manifest import InsideEntry
 from ig2mj.scene.tables import LinkKind, PieceKind, SceneTables
 from ig2mj.states import (
     ExtendedStates,
@@ -55,6 +56,7 @@ class Item:
     parts: Mapping[str, Sequence[float]] = dataclasses.field(default_factory=dict)  # half -> offset
     part_of: str | None = None
     parked: bool = False
+    inside: InsideEntry | None = None
 
 
 def shell(width: float, depth: float, height: float, wall: float = 0.02, top: bool = True) -> tuple:
@@ -80,8 +82,10 @@ class HandWorld:
         fingers: int = 0,
         agent: bool = False,
         fovy: float = np.pi / 2,
+        substances: Sequence[str] = (),
     ):
         """`rooms`: instance name -> range of x it spans; the map covers x, y in [-5, 5] at 0.1 m."""
+        self.substances = substances
         self.things, self.agent, self.fingers = things, agent or fingers > 0, fingers
         self.index = {t.name: i for i, t in enumerate(things)}
         self.links = [(i, kind, link) for i, t in enumerate(things) for kind, link in t.links.items()]
@@ -103,7 +107,11 @@ class HandWorld:
         ]
         chosen = StateOptions(**options)
         abilities = [thing.abilities for thing in self.things]
-        return StateModel(self.tables, make_parameters(self.tables, abilities, parts, chosen.compat), chosen)
+        made = StateModel(self.tables, make_parameters(self.tables, abilities, parts, chosen.compat), chosen)
+        if not self.substances:
+            return made
+        insides = {self.index[t.name]: t.inside for t in self.things if t.inside is not None}
+        return made.with_substances(self.substances, insides)
 
     def view(
         self,

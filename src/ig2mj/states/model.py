@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Int
 
-from ig2mj.scene.manifest import Manifest
+from ig2mj.scene.manifest import InsideEntry, Manifest
 from ig2mj.scene.tables import LinkKind, SceneTables
 from ig2mj.states.added import added_states, substance_states
 from ig2mj.states.options import StateOptions
@@ -40,8 +41,22 @@ class StateModel:
         parameters = parameters_of_manifest(manifest, tables, options.compat)
         if not manifest.substances:
             return cls(tables, parameters, options)
-        substances = SubstanceModel.of_manifest(tables, manifest, parameters)
-        return cls(tables, parameters, options, (*substance_states(), *added_states()), substances)
+        insides = {o: entry.inside for o, entry in enumerate(manifest.objects) if entry.inside is not None}
+        return cls(tables, parameters, options).with_substances(manifest.substances, insides)
+
+    def with_substances(self, names: Sequence[str], insides: Mapping[int, InsideEntry]) -> StateModel:
+        """The same scene with substances in use, and the insides of its containers, by object.
+
+        Raises:
+          UnknownNameError: a substance is not known.
+        """
+        holds = np.isin(np.arange(self.tables.num_objects), list(insides))
+        thermal = self.parameters.thermal | holds  # contents have the container's temperature
+        parameters = dataclasses.replace(self.parameters, thermal=thermal)
+        substances = SubstanceModel.build(self.tables, names, insides, parameters)
+        return dataclasses.replace(
+            self, parameters=parameters, added=(*substance_states(), *self.added), substances=substances
+        )
 
     @property
     def paper(self) -> bool:

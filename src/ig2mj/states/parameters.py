@@ -95,11 +95,7 @@ def parameters_of_manifest(manifest: Manifest, tables: SceneTables, compat: Comp
     """The parameters of a scene as its manifest states them."""
     index = {name: i for i, name in enumerate(tables.object_names)}
     parts = [Part(index[o.name], index[p.object], p.pos, p.quat) for o in manifest.objects for p in o.parts]
-    made = make_parameters(tables, [o.abilities for o in manifest.objects], parts, compat)
-    if not manifest.substances:
-        return made
-    holds = np.array([o.inside is not None for o in manifest.objects], bool)
-    return dataclasses.replace(made, thermal=made.thermal | holds)  # contents have the container's temperature
+    return make_parameters(tables, [o.abilities for o in manifest.objects], parts, compat)
 
 
 def make_parameters(

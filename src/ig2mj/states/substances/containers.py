@@ -6,7 +6,7 @@ Axes: C containers, U substances, R = 8 corners of a rim, A tilts, B directions,
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -15,12 +15,18 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_rotate, quat_rotate_inverse
-from ig2mj.scene.manifest import InsideEntry, Manifest
+from ig2mj.scene.manifest import InsideEntry
 from ig2mj.scene.tables import SceneTables
 
 TILTS, DIRECTIONS, CORNERS = 19, 8, 8
 """Rows and columns of `Containers.capacity`: tilts from 0 to 180 degrees, directions of it about the opening's axis;
 and corners that every rim has."""
+
+LOWEST = 0.005
+"""m above the lowest corner of a rim up to which others count as lowest, too, the less the higher they are."""
+
+SMALL = 1e-2
+"""Weight, 1/m, of the way to the lowest place next to the direction of the opening."""
 
 FINENESS = 18
 """Points along each edge of the box of an inside with which its volumes are measured."""
@@ -48,9 +54,11 @@ class Containers:
     drains: Bool[np.ndarray, "C"]
 
     @classmethod
-    def of_manifest(cls, tables: SceneTables, manifest: Manifest, drains: Bool[np.ndarray, "O"]) -> Containers:
-        """Those of a scene: objects with an inside. `drains`: objects with a drain."""
-        found = [(o, e.inside) for o, e in enumerate(manifest.objects) if e.inside is not None]
+    def build(
+        cls, tables: SceneTables, insides: Mapping[int, InsideEntry], drains: Bool[np.ndarray, "O"]
+    ) -> Containers:
+        """Those of a scene. `insides`: of the objects that have one. `drains`: objects with a drain."""
+        found = list(insides.items())
         objects = np.array([o for o, _ in found], int)
         shapes: dict[bytes, _Shape] = {}
         rows = []
@@ -109,10 +117,15 @@ class Openings(NamedTuple):
     normal: Float[Array, "W C 3"]
 
     def lowest(self) -> Float[Array, "W C 3"]:
-        """The lowest corner of each rim."""
+        """The lowest place of each rim: the mean of its lowest corners, of an edge its middle."""
         height = self.rim[..., 2]
-        first = jnp.argmin(height, axis=-1)[..., None] == np.arange(height.shape[-1])
-        return jnp.sum(jnp.where(first[..., None], self.rim, 0.0), axis=2)
+        weight = jnp.maximum(LOWEST - (height - jnp.min(height, axis=-1, keepdims=True)), 0.0)
+        return jnp.sum(weight[..., None] * self.rim, axis=2) / jnp.sum(weight, axis=2)[..., None]
+
+    def outwards(self) -> Float[Array, "W C 2"]:
+        """Horizontal unit vectors in which the openings point; of one that points up or down, to its lowest place."""
+        way = self.normal[..., :2] + SMALL * (self.lowest() - self.centre)[..., :2]
+        return way / jnp.maximum(jnp.sqrt(jnp.sum(way * way, axis=-1, keepdims=True)), 1e-6)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -15,7 +15,6 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.errors import StateError
 from ig2mj.geometry.surface import object_surfaces, sample_surface, uncovered
 from ig2mj.knowledge.substances import DRY, DUST, STAIN, WATER, Substance, substance
-from ig2mj.scene.manifest import Manifest
 from ig2mj.scene.tables import SceneTables
 from ig2mj.states.parameters import StateParameters
 from ig2mj.states.substances.containers import Containers
@@ -65,11 +64,22 @@ class SubstanceModel:
     normal: Float[np.ndarray, "D N 3"]
 
     @classmethod
-    def of_manifest(cls, tables: SceneTables, manifest: Manifest, parameters: StateParameters) -> SubstanceModel | None:
-        """That of a scene; None: it names no substances. Raises UnknownNameError: one is not known."""
-        used = tuple(substance(name) for name in dict.fromkeys(manifest.substances) if name not in ALWAYS)
-        if not manifest.substances:
-            return None
+    def build(
+        cls,
+        tables: SceneTables,
+        wanted: Sequence[str],
+        insides: Mapping[int, InsideEntry],
+        parameters: StateParameters,
+    ) -> SubstanceModel:
+        """That of a scene.
+
+        Args:
+          wanted: names of substances. insides: of the objects that are containers.
+
+        Raises:
+          UnknownNameError: a substance is not known.
+        """
+        used = tuple(substance(name) for name in dict.fromkeys(wanted) if name not in ALWAYS)
         names = [s.name for s in used]
         building = ("walls", "ceilings")
         covered = [o for o, category in enumerate(tables.object_categories) if category not in building]
@@ -85,7 +95,7 @@ class SubstanceModel:
             cleaners=np.array([[t.name in s.cleaned_by for t in used] for s in used], bool).reshape(len(used), -1),
             dry=np.array([DRY in s.cleaned_by for s in used], bool),
             wet=np.array([WATER in s.cleaned_by for s in used], bool),
-            containers=Containers.of_manifest(tables, manifest, parameters.has("waterSink")),
+            containers=Containers.build(tables, insides, parameters.has("waterSink")),
             covered=np.array(covered, int),
             row=row,
             body=np.array([p[0] for p in points], int).reshape(-1, NUM_POINTS),

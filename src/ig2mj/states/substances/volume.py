@@ -147,9 +147,7 @@ def update(step: EventStep) -> EventStep:
 def _beginnings(model: StateModel, view: PhysicsView) -> tuple[Float[Array, "W E 3"], Float[Array, "W E 2"]]:
     """Where streams of each outlet begin (m, world), and the unit vector outwards (0 of a tap)."""
     openings = of(model).containers.openings(view)
-    low = openings.lowest()
-    out = (low - openings.centre)[..., :2]
-    out = out / jnp.maximum(jnp.sqrt(jnp.sum(out * out, axis=-1, keepdims=True)), 1e-6)
+    low, out = openings.lowest(), openings.outwards()
     tap = jnp.asarray(view.link_pos)[:, _tap_links(model)]
     return jnp.concatenate([low, tap], axis=1), jnp.concatenate([out, jnp.zeros(tap[..., :2].shape)], axis=1)
 
