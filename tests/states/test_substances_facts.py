@@ -164,6 +164,59 @@ def test_a_sponge_removes_what_it_is_saturated_for(substance, needs):
     assert left(away) == 20  # without contact nothing is wiped off
 
 
+RULES = (
+    "water",
+    "cooked__water",
+    "lemon_juice",
+    "granulated_sugar",
+    "lemonade",
+    "grated_cheese",
+    "melted__grated_cheese",
+)
+KITCHEN = HandWorld(
+    container("pot", (0.1, 0.1, 0.1)),
+    Item("spoon", category="spoon", pos=(1, 1, 1)),
+    Item("bagel", abilities={"cookable": {}}, pos=(2, 2, 0)),
+    substances=RULES,
+)
+
+
+def _kitchen(**litres: float):
+    model = KITCHEN.model()
+    states = initial_states(model, 1)
+    for name, value in litres.items():
+        states = volume.set_volume(model, states, 0, name, value)
+    return model, states
+
+
+def _pot(states) -> dict[str, float]:
+    return {n: round(float(v), 5) for n, v in zip(RULES, states.volume[0, 0], strict=True) if v}
+
+
+def test_what_is_stirred_becomes_what_its_rule_says():
+    model, states = _kitchen(water=0.5, lemon_juice=0.2, granulated_sugar=0.1)
+    alone = step(model, states, KITCHEN.view())
+    assert _pot(alone) == {"water": 0.5, "lemon_juice": 0.2, "granulated_sugar": 0.1}
+    stirred = step(model, alone, KITCHEN.view(touching=[("spoon", "pot")]))
+    assert _pot(stirred) == {"lemonade": 0.8}
+
+
+def test_what_is_hot_is_cooked_a_step_later():
+    model, states = _kitchen(water=0.5)
+    hot = states.replace(temperature=states.temperature.at[0, 0].set(90.0))
+    first = step(model, hot, KITCHEN.view())
+    assert _pot(first) == {"water": 0.5}
+    assert _pot(step(model, first, KITCHEN.view())) == {"cooked__water": 0.5}
+
+
+def test_what_covers_something_hot_melts():
+    model, states = _kitchen()
+    states = coat.set_covered(model, states, 2, "grated_cheese", True)
+    hot = states.replace(temperature=states.temperature.at[0, 2].set(60.0))
+    found = np.asarray(coat.covered(model, step(model, step(model, hot, KITCHEN.view()), KITCHEN.view())))[0, 2]
+    assert [n for n, is_on in zip(RULES, found, strict=True) if is_on] == ["melted__grated_cheese"]
+
+
 @given(st.lists(st.integers(0, 19), unique=True))
 def test_points_are_bits(points):
     mask = np.isin(np.arange(20), points)

@@ -125,7 +125,69 @@ def fetch() -> None:
     print(f"{folder}: {len(activity_names(behavior_1k=True))} activities (ig2mj activity list --behavior1k)")
 
 
-SUBCOMMANDS = {"list": list_, "show": show, "sample": sample, "fetch": fetch}
+def coverage(
+    names: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="ACTIVITY")] = (),
+    results: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None,
+    sample: Flag = False,
+    seconds: float = 60.0,
+    page: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.md")] = None,
+    json: Flag = False,
+) -> None:
+    """Count BEHAVIOR-1K's definitions that can be expressed, that fit a home, and whose start can be sampled.
+
+    Run `ig2mj activity fetch` first.
+
+    Args:
+      names: only these definitions; default: all.
+      results: folder of what was sampled, one file for each definition; those that are there are not sampled again.
+      sample: sample start states of definitions that fit, 10 seeds each, into --results. All of them take days of
+        processor time: give names to share the work.
+      seconds: wall time for each seed.
+      page: write a page of documentation with every definition.
+      json: print JSON instead of a table.
+    """
+    from ig2mj.cli.common.files import check_output
+    from ig2mj.cli.common.printing import add_bar, make_table, print_json, progress_bar, stdout_console
+    from ig2mj.errors import Ig2mjError, UnknownNameError
+    from ig2mj.tasks.bddl import coverage as all_of_it
+    from ig2mj.tasks.bddl.definitions import activity_names
+
+    if sample and results is None:
+        raise Ig2mjError("--sample needs --results DIR, where results are kept")
+    if page is not None:
+        check_output(page)
+    known = activity_names(True)
+    if unknown := [name for name in names if name not in known]:
+        raise UnknownNameError("activity", unknown[0], known)
+    homes = find_homes(None)
+    with progress_bar() as bar:
+        rows = all_of_it.cover(homes, results, names or None, add_bar(bar, "binding definitions"))
+        if sample and results is not None:
+            report = add_bar(bar, "sampling start states")
+            wanted = [row.name for row in rows if row.homes and row.sampled is None]
+            for done, name in enumerate(wanted):
+                report(done, len(wanted), name)
+                all_of_it.sample_definition(name, homes, results, seconds)
+            rows = all_of_it.cover(homes, results, names or None)
+    if page is not None:
+        page.write_text(all_of_it.page(rows), encoding="utf-8")
+    found = all_of_it.counts(rows)
+    if json:
+        lacks = {row.name: row.why_not for row in rows if row.why_not}
+        more = {"lacking": all_of_it.lacking(rows), "missing": all_of_it.missing(rows), "why_not": lacks}
+        print_json({**found, **more})
+        return
+    console = stdout_console()
+    console.print(make_table("BEHAVIOR-1K", (">definitions", ">expressible", ">fits", ">sampled"), [tuple(found.values())],
+                             console.width))  # fmt: skip
+    for title, table in (("not expressed", all_of_it.lacking(rows)), ("no object for", all_of_it.missing(rows))):
+        if table:
+            first = list(table.items())[:15]
+            console.print(make_table(f"{title} (definitions that lack only this)", ("?what", ">definitions"), first,
+                                     console.width))  # fmt: skip
+
+
+SUBCOMMANDS = {"list": list_, "show": show, "sample": sample, "fetch": fetch, "coverage": coverage}
 
 
 def _as_text(activity: Activity) -> list[str]:

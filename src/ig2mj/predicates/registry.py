@@ -13,6 +13,7 @@ from ig2mj.predicates.definitions.dusty import DUSTY
 from ig2mj.predicates.definitions.empty import EMPTY
 from ig2mj.predicates.definitions.filled import FILLED
 from ig2mj.predicates.definitions.frozen import FROZEN
+from ig2mj.predicates.definitions.hot import HOT_PREDICATE
 from ig2mj.predicates.definitions.in_contact_with import IN_CONTACT_WITH
 from ig2mj.predicates.definitions.in_fov_of_agent import IN_FOV_OF_AGENT
 from ig2mj.predicates.definitions.in_hand_of_agent import IN_HAND_OF_AGENT
@@ -24,6 +25,7 @@ from ig2mj.predicates.definitions.next_to import NEXT_TO
 from ig2mj.predicates.definitions.on_floor import ON_FLOOR
 from ig2mj.predicates.definitions.on_top import ON_TOP
 from ig2mj.predicates.definitions.open import OPEN
+from ig2mj.predicates.definitions.present import PRESENT
 from ig2mj.predicates.definitions.saturated import SATURATED
 from ig2mj.predicates.definitions.sliced import SLICED
 from ig2mj.predicates.definitions.soaked import SOAKED
@@ -59,8 +61,10 @@ OWN: dict[str, Predicate] = {
 }
 """The 19 predicates of the paper's table A.1, under their snake_case names."""
 
-OF_SUBSTANCES: dict[str, Predicate] = {p.name: p for p in (COVERED, SATURATED, FILLED, CONTAINS, EMPTY, INSOURCE)}
-"""Predicates of what covers and fills objects (docs/guide/substances.md)."""
+OF_SUBSTANCES: dict[str, Predicate] = {
+    p.name: p for p in (COVERED, SATURATED, FILLED, CONTAINS, EMPTY, INSOURCE, PRESENT, HOT_PREDICATE)
+}
+"""Predicates of what covers and fills objects (docs/guide/substances.md), and others beyond the paper."""
 
 SHIPPED: dict[str, Predicate] = {**OWN, **OF_SUBSTANCES}
 

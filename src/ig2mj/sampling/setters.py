@@ -186,6 +186,13 @@ def _frozen(t: _Task, value: bool) -> Change:
     return Change(dataclasses.replace(t.states, temperature=new))
 
 
+def _hot(t: _Task, value: bool) -> Change:
+    if not t.model.parameters.thermal[t.objects[0]]:
+        raise StateError(f"'{t.object_name}' has no temperature")
+    new = temperature.set_hot(t.model, t.states.temperature, t.mask, value, t.key)
+    return Change(dataclasses.replace(t.states, temperature=new))
+
+
 def _soaked(t: _Task, value: bool) -> Change:
     return Change(dataclasses.replace(t.states, wetness=wetness.set_soaked(t.model, t.states.wetness, t.mask, value)))
 
@@ -240,6 +247,7 @@ _SETTERS: dict[str, Callable[[_Task, bool], Change]] = {
     "cooked": _cooked,
     "burnt": _burnt,
     "frozen": _frozen,
+    "hot": _hot,
     "soaked": _soaked,
     "toggled_on": _toggled_on,
     "open": _open,

@@ -17,4 +17,6 @@ def _contains(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O A"]
     return of_containers(model, table, states.sliced.shape[0])
 
 
+CONTAINS_TABLE = _contains
+
 CONTAINS = of_pairs("contains", _contains, why=why_volume)

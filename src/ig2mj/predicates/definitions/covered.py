@@ -43,4 +43,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
     return f"{int(bits).bit_count()} of {coat.NUM_POINTS} points, covered from 1 on"
 
 
+COVERED_TABLE = _covered
+
 COVERED = of_pairs("covered", _covered, why=_why)

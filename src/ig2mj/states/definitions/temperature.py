@@ -30,6 +30,12 @@ FROZEN_RANGE = (50.0, 10.0)
 """Celsius below the freezing temperature between which Frozen(o)=True is sampled (paper table A.5)."""
 
 
+HOT = 40.0
+"""Celsius from which an object is hot (OmniGibson's heated.py)."""
+
+HOT_RANGE = (10.0, 20.0)
+"""Celsius above `HOT` between which Hot(o)=True is sampled (OmniGibson's heated.py)."""
+
 THERMAL = ("cookable", "burnable", "freezable")
 """Any of these gives an object a temperature (table A.2)."""
 
@@ -79,6 +85,19 @@ def set_frozen(
     else:
         target = freeze + 1.0
     chosen = objects & model.parameters.has("freezable")
+    return namespace(temperature).where(chosen, target, temperature).astype(np.float32)
+
+
+def set_hot(
+    model: StateModel,
+    temperature: Float[Array, "W O"],
+    objects: Bool[Array, "#W O"],
+    value: bool,
+    key: Randomness,
+) -> Float[Array, "W O"]:
+    """Makes the masked objects Hot, uniformly 10 to 20 degrees above `HOT`, or not, one degree below it."""
+    target = HOT + uniform(key, temperature.shape, *HOT_RANGE) if value else np.float32(HOT - 1.0)
+    chosen = objects & model.parameters.thermal
     return namespace(temperature).where(chosen, target, temperature).astype(np.float32)
 
 

@@ -152,7 +152,7 @@ def _meeting(step: EventStep) -> Bool[Array, "W T D U"]:
     return (touching[..., None] & can_remove(step)[:, :, None]) & (jnp.asarray(step.states.coat) > 0)[:, None]
 
 
-def update(step: EventStep) -> EventStep:
+def wipe(step: EventStep) -> EventStep:
     """One control step of all cleaning tools."""
     model = step.model
     if not len(model.parameters.tool_object) or not len(of(model).covered) or not len(of(model).names):
@@ -188,7 +188,7 @@ def _wiped(step: EventStep, meeting: Bool[Array, "W T D U"]) -> dict[str, Array]
     return {"coat": coat, "absorbed": absorbed, "wetness": wet}
 
 
-def idle(step: EventStep) -> Bool[Array, ""]:
+def wipes_nothing(step: EventStep) -> Bool[Array, ""]:
     """No tool meets what it can remove."""
     if not len(step.model.parameters.tool_object) or not len(of(step.model).covered):
         return jnp.array(True)
@@ -257,8 +257,8 @@ SPEC = StateSpec(
     abilities=None,
     fields={"coat": UInt32[Array, "W D U"], "absorbed": Float[Array, "W D U"]},
     initial=_initial,
-    update=update,
-    idle=idle,
+    update=wipe,
+    idle=wipes_nothing,
     inherit=_inherit,
     from_manifest=_from_manifest,
 )

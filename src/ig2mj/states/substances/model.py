@@ -6,7 +6,9 @@ Axes: U substances in use, C containers, D objects that can be covered, N = 20 p
 from __future__ import annotations
 
 import dataclasses
+import functools
 import zlib
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +17,8 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.errors import StateError
 from ig2mj.geometry.surface import object_surfaces, sample_surface, uncovered
 from ig2mj.knowledge.substances import DRY, DUST, STAIN, WATER, Substance, substance
+from ig2mj.knowledge.transitions import Transition, transitions_of
+from ig2mj.scene.manifest import InsideEntry
 from ig2mj.scene.tables import SceneTables
 from ig2mj.states.parameters import StateParameters
 from ig2mj.states.substances.containers import Containers
@@ -44,7 +48,7 @@ class SubstanceModel:
       freeze: Celsius at which each is solid, -inf: never. has_volume: it can be in containers.
       cleaners: [U, U] whether a tool saturated with the second removes the first. dry: whether every tool does.
         wet: whether a tool soaked with water does.
-      containers: see `Containers`.
+      rules: transition rules that have all they need among the substances. containers: see `Containers`.
       covered: objects of the D axis. row: place of each object on it, or D. body, pos, normal: points, in the frames of
         bodies.
     """
@@ -56,6 +60,7 @@ class SubstanceModel:
     cleaners: Bool[np.ndarray, "U U"]
     dry: Bool[np.ndarray, "U"]
     wet: Bool[np.ndarray, "U"]
+    rules: tuple[Transition, ...]
     containers: Containers
     covered: Int[np.ndarray, "D"]
     row: Int[np.ndarray, "O"]
@@ -86,7 +91,7 @@ class SubstanceModel:
         covered = [o for o in covered if np.any(tables.piece_object == o)]
         row = np.full(tables.num_objects, len(covered))
         row[covered] = np.arange(len(covered))
-        points = [_points(tables, o) for o in covered]
+        points = _all_points(tables, tuple(covered))
         return cls(
             substances=used,
             water=names.index(WATER) if WATER in names else -1,
@@ -95,6 +100,7 @@ class SubstanceModel:
             cleaners=np.array([[t.name in s.cleaned_by for t in used] for s in used], bool).reshape(len(used), -1),
             dry=np.array([DRY in s.cleaned_by for s in used], bool),
             wet=np.array([WATER in s.cleaned_by for s in used], bool),
+            rules=transitions_of(names),
             containers=Containers.build(tables, insides, parameters.has("waterSink")),
             covered=np.array(covered, int),
             row=row,
@@ -114,6 +120,12 @@ def of(model: StateModel) -> SubstanceModel:
     if model.substances is None:
         raise StateError("the scene has no substances in use: load it with substances=['water', ...]")
     return model.substances
+
+
+@functools.lru_cache(maxsize=4)
+def _all_points(tables: SceneTables, objects: tuple[int, ...]) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """`_points` of some objects of a scene; asked again, the same."""
+    return [_points(tables, o) for o in objects]
 
 
 def _points(tables: SceneTables, obj: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
-from ig2mj.states.spec import StateSpec
-from ig2mj.states.substances import coat, solid, volume
+import dataclasses
 
-SUBSTANCE_STATES: tuple[StateSpec, ...] = (volume.SPEC, coat.SPEC, solid.SPEC)
-"""What flows and falls, what tools wipe off, what is frozen."""
+from ig2mj.states.spec import StateSpec
+from ig2mj.states.substances import coat, reactions, solid, volume
+
+COAT = dataclasses.replace(
+    coat.SPEC,
+    update=lambda step: reactions.update(coat.wipe(step)),
+    idle=lambda step: coat.wipes_nothing(step) & reactions.idle(step),
+)
+"""What tools wipe off, and then what transition rules make of contents and coats."""
+
+SUBSTANCE_STATES: tuple[StateSpec, ...] = (volume.SPEC, COAT, solid.SPEC)
+"""What flows and falls, what becomes of it, what is frozen."""

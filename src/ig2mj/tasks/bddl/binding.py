@@ -22,6 +22,7 @@ from ig2mj.predicates.logic import Atom
 from ig2mj.scene.additions import name_additions
 from ig2mj.scene.library import LibraryModel, library
 from ig2mj.scene.manifest import Manifest, ObjectEntry
+from ig2mj.scene.substance_requests import substances_as_text
 from ig2mj.tasks.bddl.matching import clusters_of, match, search_rooms
 from ig2mj.tasks.bddl.synsets import AGENT, Kinds, kinds
 from ig2mj.tasks.bddl.vocabulary import Activity
@@ -31,6 +32,9 @@ TOOLS = (
     (frozenset(("sliced",)), "slicer", "carving_knife/carving_knife_00"),
 )
 """Predicates of a goal, the ability of the tool that they take, and the model that is added where the home has none."""
+
+PLACES = ("on_top", "inside", "next_to", "under", "in_contact_with")
+"""Predicates of two objects that say where the first is."""
 
 
 class BindingError(Ig2mjError):
@@ -65,6 +69,11 @@ class Binding:
     stand_ins: Mapping[str, str]
     tools: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
+    @property
+    def requested(self) -> tuple[str, ...]:
+        """What `load_scene(home, objects=...)` must be given: the additions, and the substances in use."""
+        return (*self.additions, *substances_as_text(self.activity.substances))
+
 
 def bind(activity: Activity, manifest: Manifest, agents: Sequence[str] = ()) -> Binding:
     """Binds an activity in a home.
@@ -87,9 +96,7 @@ class _Binder:
         self.needs = activity.needs
         #: Objects that the start puts on something. Fixed ones cannot be, but may stand on the floor of a room already.
         self.placed = {
-            a.arguments[0]
-            for a in self.activity.init
-            if isinstance(a, Atom) and len(a.arguments) == 2 and a.predicate != "on_floor"
+            a.arguments[0] for a in self.activity.init if isinstance(a, Atom) and a.predicate in PLACES
         } - set(self.activity.rooms)
         self.floors = {
             a.arguments[0]: a.arguments[1]
@@ -164,7 +171,9 @@ class _Binder:
         if not instances:
             self.reasons.append(f"has no {kind}")
             return
-        related = [a.arguments for a in self.activity.init if isinstance(a, Atom) and len(a.arguments) == 2]
+        related = [
+            a.arguments for a in self.activity.init if isinstance(a, Atom) and a.predicate in (*PLACES, "on_floor")
+        ]
         clusters = clusters_of(names, [(a, b) for a, b in related])
         found = search_rooms(clusters, instances, self.cost)
         if found is None:
@@ -261,6 +270,12 @@ def able(o: ObjectEntry, predicates: Iterable[str]) -> bool:
         if ability is not None and ability not in o.abilities:
             return False
         if (name == "open" and not o.openable) or (name == "sliced" and not o.parts):
+            return False
+        if name in ("filled", "contains") and o.inside is None:
+            return False
+        if name == "insource" and o.inside is None and "waterSource" not in o.abilities:
+            return False
+        if name == "saturated" and not {"soakable", "cleaningTool"} & set(o.abilities):
             return False
     return True
 

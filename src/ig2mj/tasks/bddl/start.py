@@ -74,7 +74,8 @@ def fitting(activity: Activity, homes: Sequence[Manifest]) -> tuple[list[Binding
 def start_conditions(binding: Binding, scene: Scene) -> list[Condition]:
     """What must hold at the start, of the scene's objects.
 
-    Left out are conditions of absent agents, and that a fixed object is on the floor of the room where it stands.
+    Left out are conditions of absent agents, that a fixed object is on the floor of the room where it stands, and that
+    there is none of a substance yet.
 
     Raises:
       StateError: a condition is neither a predicate nor the negation of one.
@@ -87,7 +88,7 @@ def start_conditions(binding: Binding, scene: Scene) -> list[Condition]:
         entry = scene.object(c.arguments[0])
         return entry.fixed and (c.arguments[1] in entry.rooms or c.arguments[1] not in scene.tables.room_names)
 
-    found = [c for c in read if not is_given(c)]
+    found = [c for c in read if not is_given(c) and c.predicate != "present"]
     placed = {c.arguments[0] for c in found if c.is_placement and c.value}
     wanted = [
         (binding.objects[name], room) for name, room in binding.rooms.items() if binding.objects[name] in binding.added
@@ -102,7 +103,7 @@ def load_bound(binding: Binding, home: str | os.PathLike | None = None, added: S
     Args:
       home: where it lies; default: the shipped one of that name. added: further objects (see `load_scene`).
     """
-    return load_scene(binding.home if home is None else home, objects=(*binding.additions, *added))
+    return load_scene(binding.home if home is None else home, objects=(*binding.requested, *added))
 
 
 HOMES = 3

@@ -6,26 +6,34 @@ some things in another way:
     ontop X floor.n.01_1                     on_floor X floor.n.01_1
     covered X stain.n.01_1, ... dust.n.01_1  stained X, dusty X
     saturated X water.n.06_1                 soaked X
+    covered, saturated, filled, contains, insource X mud.n.03_1     the same of X and mud
+    future mud.n.03_1, real mud.n.03_1       not present mud, present mud
     real half__apple.n.01_1                  sliced apple.n.01_1, likewise (not (real apple.n.01_1))
     future half__apple.n.01_1                not sliced apple.n.01_1
 
-Halves that an activity waits for are the parts of their whole. What else 3.6 knows (filled, attached, folded, ...) has
-no state here.
+Halves that an activity waits for are the parts of their whole. A substance that an activity waits for must be one that
+a transition rule makes. What else 3.6 knows (attached, folded, ...) has no state here.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
-from ig2mj.errors import Ig2mjError
+from ig2mj.errors import Ig2mjError, UnknownNameError
+from ig2mj.knowledge.substances import substance
+from ig2mj.knowledge.transitions import is_makeable
 from ig2mj.predicates import find, logic
 from ig2mj.predicates.logic import Atom, Expression, Not
 from ig2mj.tasks.bddl.problem import Problem
 from ig2mj.tasks.bddl.synsets import FLOOR, ROOM_STAND_INS
 
 BEHAVIOR_1K = "omnigibson"
+OF_SUBSTANCES = ("covered", "saturated", "filled", "contains", "insource")
+"""Predicates of an object and a substance, under the same names here."""
+SAME = ("ontop", "inside", "nextto", "under", "touching", "cooked", "frozen", "open", "toggled_on", "hot")
+"""Other predicates that `ig2mj.predicates` has, perhaps under another name."""
 DIRT = {"stain.n.01": "stained", "dust.n.01": "dusty"}
 WATER = "water.n.06"
 HALF = "half__"
@@ -49,7 +57,7 @@ class Activity:
       halves: half -> (whole, number), for halves that come to be when the whole is cut.
       rooms: object -> the kind of room it has to be in.
       init: conditions of the start. goal: all must hold. Groups of quantifiers are synsets of `objects`.
-      remarks: oddities of the definition.
+      remarks: oddities of the definition. substances: names of those in use (`ig2mj.knowledge.substances`).
     """
 
     name: str
@@ -60,6 +68,7 @@ class Activity:
     init: tuple[Expression, ...]
     goal: tuple[Expression, ...]
     remarks: tuple[str, ...] = ()
+    substances: tuple[str, ...] = ()
 
     def synset_of(self) -> dict[str, str]:
         """Object -> its synset."""
@@ -100,13 +109,14 @@ def lower(problem: Problem, name: str) -> Activity:
         init=tuple(dict.fromkeys(init)),
         goal=tuple(dict.fromkeys(goal)),
         remarks=problem.remarks,
+        substances=lowering.in_use((*init, *goal)),
     )
 
 
 def _note_wanted(e: Expression, positive: bool, found: dict[str, set[str]]) -> None:
     match e:
-        case Atom(predicate, (name,)):
-            if positive:
+        case Atom(predicate, (name, *others)):
+            if positive and (not others or predicate in OF_SUBSTANCES):
                 found.setdefault(name, set()).add(predicate)
         case Not(part):
             _note_wanted(part, not positive, found)
@@ -127,7 +137,9 @@ class _Lowering:
         self.halves: dict[str, tuple[str, int]] = {}
         if not self.old:
             every = logic.atoms(logic.ground(logic.And((*problem.init, *problem.goal)), self.members))
-            self.substances = {self.synset[a.arguments[1]] for a in every if a.predicate in ("covered", "saturated")}
+            self.substances = {self.synset[a.arguments[1]] for a in every if a.predicate in OF_SUBSTANCES}
+            waiting = [self.synset[a.arguments[0]] for a in every if a.predicate in ("real", "future")]
+            self.substances |= {s for s in waiting if is_substance(s)}
             self.halves = self.find_halves({a.arguments[0] for a in every if a.predicate == "future"})
 
     def members(self, group: str) -> tuple[str, ...]:
@@ -169,17 +181,42 @@ class _Lowering:
                 return Atom(DIRT[synsets[1]], a.arguments[:1])
             case "saturated" if synsets[1] == WATER:
                 return Atom("soaked", a.arguments[:1])
+            case "covered" | "saturated" | "filled" | "contains" | "insource":
+                return Atom(a.predicate, (a.arguments[0], self.substance(synsets[1])))
+            case "real" | "future" if synsets[0] in self.substances:
+                name = self.substance(synsets[0])
+                if a.predicate == "future" and not is_makeable(name):
+                    self.unknown.add(f"a rule that makes {name}")
+                present = Atom("present", (name,))
+                return present if a.predicate == "real" else Not(present)
             case "real" | "future" if a.arguments[0] in self.halves:
                 sliced = Atom("sliced", (self.halves[a.arguments[0]][0],))
                 return sliced if a.predicate == "real" else Not(sliced)
             case "real" if self.is_cut(a.arguments[0], synsets[0]):
                 return Not(Atom("sliced", a.arguments))
         name = a.predicate
-        if name not in ("ontop", "inside", "nextto", "under", "touching", "cooked", "frozen", "open", "toggled_on"):
-            substance = f" {synsets[1].split('.')[0]}" if name in ("covered", "saturated") else ""
-            self.unknown.add(name + substance)
+        if name not in SAME:
+            self.unknown.add(name)
             return a
         return Atom(find(name).name, a.arguments)
+
+    def substance(self, synset: str) -> str:
+        """The substance of a synset; one that is not known is noted."""
+        name = stem_of(synset)
+        if not is_substance(synset):
+            self.unknown.add(f"the substance {name}")
+        return name
+
+    def in_use(self, parts: Sequence[Expression]) -> tuple[str, ...]:
+        """Names of the substances in lowered conditions, and of those from which they are made."""
+        found: dict[str, None] = {}
+        for part in parts:
+            for a in logic.atoms(logic.ground(part, self.problem.objects.__getitem__)):
+                if a.predicate in OF_SUBSTANCES:
+                    found[a.arguments[1]] = None
+                elif a.predicate == "present":
+                    found[a.arguments[0]] = None
+        return tuple(found)
 
     def is_cut(self, name: str, synset: str) -> bool:
         """Whether an object, or every object of a variable's synset, is a whole that halves wait for."""
@@ -189,6 +226,20 @@ class _Lowering:
 
 AtomRule = Callable[[Atom, Mapping[str, str]], Expression]
 """What an atom becomes, given the variables bound around it with their groups."""
+
+
+def stem_of(synset: str) -> str:
+    """The name in a synset: "water.n.06" -> "water"."""
+    return synset.split(".")[0]
+
+
+def is_substance(synset: str) -> bool:
+    """Whether a synset names a substance."""
+    try:
+        substance(stem_of(synset))
+    except UnknownNameError:
+        return False
+    return True
 
 
 def rewrite(e: Expression, rule: AtomRule, bound: Mapping[str, str] | None = None) -> Expression:
