@@ -178,8 +178,8 @@ def coverage(
         print_json({**found, **more})
         return
     console = stdout_console()
-    console.print(make_table("BEHAVIOR-1K", (">definitions", ">expressible", ">fits", ">sampled"), [tuple(found.values())],
-                             console.width))  # fmt: skip
+    columns = tuple(f">{name}" for name in found)
+    console.print(make_table("BEHAVIOR-1K", columns, [tuple(found.values())], console.width))
     for title, table in (("not expressed", all_of_it.lacking(rows)), ("no object for", all_of_it.missing(rows))):
         if table:
             first = list(table.items())[:15]
