@@ -79,13 +79,13 @@ def test_all_1016_definitions_read_as_bddl_3_6_reads_them(package):
 
 
 @pytest.mark.slow
-def test_at_least_the_257_with_only_our_predicates_can_be_expressed(package):
+def test_definitions_without_cloth_attachment_and_dicing_can_be_expressed(package):
     expressed = []
     for name in activity_names(behavior_1k=True):
         try:
             expressed.append(load_activity(name, behavior_1k=True))
         except VocabularyError:
             continue
-    assert len(expressed) == 326  # 257, and those with stains, dust, halves and soaking
+    assert len(expressed) == 806
     with pytest.raises(UnknownNameError, match="near matches"):
         load_activity("loading_the_cars", behavior_1k=True)

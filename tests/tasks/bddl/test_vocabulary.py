@@ -66,6 +66,19 @@ def test_saturated_with_water_is_soaked():
     assert set(activity.objects) == {"r"}
 
 
+def test_what_fills_and_covers_is_a_substance_in_use():
+    activity = lowered(
+        "a_1 - a salt.n.02_1 - salt.n.02 mud.n.03_1 - mud.n.03 cooked__salt.n.01_1 - cooked__salt.n.01",
+        "(filled a_1 salt.n.02_1) (covered a_1 mud.n.03_1) (insource a_1 salt.n.02_1) (future cooked__salt.n.01_1)",
+        "(and (contains ?a_1 ?cooked__salt.n.01_1) (real ?cooked__salt.n.01_1))",
+    )
+    wanted = ["(filled a_1 salt)", "(covered a_1 mud)", "(insource a_1 salt)", "(not (present cooked__salt))"]
+    assert texts(activity.init) == wanted
+    assert texts(activity.goal) == ["(contains a_1 cooked__salt)", "(present cooked__salt)"]
+    assert set(activity.substances) == {"salt", "mud", "cooked__salt"}
+    assert activity.needs["a_1"] == {"filled", "covered", "insource", "contains"}
+
+
 HALVES = (
     "apple.n.01_1 apple.n.01_2 - apple.n.01 "
     "half__apple.n.01_1 half__apple.n.01_2 half__apple.n.01_3 half__apple.n.01_4 - half__apple.n.01"
@@ -94,10 +107,11 @@ def test_a_whole_that_is_no_longer_real_is_sliced():
 @pytest.mark.parametrize(
     ("objects", "condition", "lacking"),
     [
-        ("a_1 - a s_1 - salt.n.02", "(covered a_1 s_1)", "covered salt"),
-        ("a_1 - a w_1 - water.n.06", "(filled a_1 w_1)", "filled"),
+        ("a_1 - a s_1 - sal.n.02", "(covered a_1 s_1)", "the substance sal"),
         ("a_1 - a", "(folded a_1)", "folded"),
-        ("diced__beet.n.01_1 - diced__beet.n.01", "(real diced__beet.n.01_1)", "real"),
+        ("a_1 a_2 - a", "(attached a_1 a_2)", "attached"),
+        ("diced__beet.n.01_1 - diced__beet.n.01", "(future diced__beet.n.01_1)", "a rule that makes diced__beet"),
+        ("cookie.n.01_1 - cookie.n.01", "(real cookie.n.01_1)", "real"),
     ],
 )
 def test_what_no_state_expresses_is_named(objects, condition, lacking):

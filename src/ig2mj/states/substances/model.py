@@ -97,7 +97,9 @@ class SubstanceModel:
             water=names.index(WATER) if WATER in names else -1,
             freeze=np.array([-np.inf if s.freeze is None else s.freeze for s in used], np.float32),
             has_volume=np.array([s.has_volume for s in used], bool),
-            cleaners=np.array([[t.name in s.cleaned_by for t in used] for s in used], bool).reshape(len(used), -1),
+            cleaners=np.array([[t.name in s.cleaned_by for t in used] for s in used], bool).reshape(
+                len(used), len(used)
+            ),
             dry=np.array([DRY in s.cleaned_by for s in used], bool),
             wet=np.array([WATER in s.cleaned_by for s in used], bool),
             rules=transitions_of(names),

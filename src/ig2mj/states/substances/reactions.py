@@ -49,8 +49,8 @@ def reactions(model: StateModel) -> Reactions:
     rules, names = found.rules, found.names
     return Reactions(
         rules=rules,
-        inputs=np.array([[n in r.inputs for n in names] for r in rules], bool).reshape(len(rules), -1),
-        output=np.array([[n == r.output for n in names] for r in rules], bool).reshape(len(rules), -1),
+        inputs=np.array([[n in r.inputs for n in names] for r in rules], bool).reshape(len(rules), len(names)),
+        output=np.array([[n == r.output for n in names] for r in rules], bool).reshape(len(rules), len(names)),
         temperature=np.array([r.temperature for r in rules], np.float32),
         stir=np.array([r.stir for r in rules], bool),
         single=np.array([len(r.inputs) == 1 for r in rules], bool),
