@@ -83,6 +83,6 @@ def test_engines_agree(scene):
     native, batched = ig2mj.Worlds(scene, 2, "native"), ig2mj.Worlds(scene, 2, "jax")
     one, other = native.start(), batched.start()
     for _ in range(45):
-        one, other = native.step(one), batched.step(other)
+        (one, _), (other, _) = native.step(one), batched.step(other)
     assert float(one.world.states.volume[0, 1, 0]) > 0.5
     np.testing.assert_allclose(one.world.states.volume, other.world.states.volume, atol=1e-3)
