@@ -8,7 +8,7 @@ import pytest
 
 import ig2mj
 from ig2mj.envs.rollout import play
-from ig2mj.showcase.episode_video import BETWEEN, LAST, EpisodeVideo
+from ig2mj.showcase.episode_video import BETWEEN, ESTABLISHING, LAST, EpisodeVideo
 from ig2mj.viewer import episode_view
 from ig2mj.viewer.offscreen import default_backend
 from ig2mj.viewer.video import ffmpeg_program
@@ -24,13 +24,13 @@ def test_a_film_shows_one_episode_and_its_end(tmp_path):
     played = play(env, lambda state: np.zeros((1, 6), np.float32), 2, watch=video.see)
     video.close()
     assert played.success == [False, False] and played.steps == 4
-    # The start, one step, and the last picture for a while; the second episode is not shown.
+    # The robot in its room, the start, one step, and the last picture for a while; the second episode is not shown.
     counted = subprocess.run(
         [ffmpeg_program(), "-i", tmp_path / "book.mp4", "-map", "0:v", "-f", "framemd5", "-"],
         capture_output=True, text=True, check=True,
     ).stdout  # fmt: skip
     frames = [line for line in counted.splitlines() if not line.startswith("#")]
-    assert len(frames) == 2 * BETWEEN + LAST
+    assert len(frames) == round(10 * ESTABLISHING * BETWEEN) + 2 * BETWEEN + LAST
 
 
 @pytest.mark.slow

@@ -166,7 +166,7 @@ def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
     report(0, None, "sampling where the steak lies")
     env = make("CookingMeat", robot="humanoid", engine="native", split="held_out", pool_size=1)
     filmed = default_backend() != "warp"  # its images take seconds
-    video = EpisodeVideo(file, env) if filmed else None
+    video = EpisodeVideo(file, env, size=(640, 480)) if filmed else None
 
     def watch(state: Any) -> None:
         if video is not None:

@@ -368,6 +368,37 @@ def images(
         print(out / name)
 
 
+def tour(
+    home: Annotated[str, tyro.conf.Positional],
+    video: Annotated[pathlib.Path, tyro.conf.arg(metavar="FILE")],
+    looks: str = "day",
+    size: tuple[int, int] = (1280, 720),
+) -> None:
+    """Write a video of a walk through a home: from above, then room after room through open doors.
+
+    Args:
+      home: name or folder of a home.
+      video: output file: .mp4, .gif or .webp.
+      looks: "day", "night", or "plain" (without decoration).
+      size: width and height in pixels.
+    """
+    from ig2mj.cli.common.files import check_video
+    from ig2mj.cli.common.printing import add_bar, progress_bar
+    from ig2mj.errors import Ig2mjError
+    from ig2mj.process.opengl import use_opengl
+    from ig2mj.scene.scene import load_scene
+    from ig2mj.viewer.tour import film_tour
+
+    if min(size) < 2:
+        raise Ig2mjError(f"--size {size[0]} {size[1]}: at least 2 x 2 pixels")
+    check_video(video)
+    scene = load_scene(home, looks=looks)
+    use_opengl()
+    with progress_bar() as bar:
+        count = film_tour(scene, video, size=size, progress=add_bar(bar, f"tour of {scene.name}"))
+    print(f"{video}: {count} frames, {count / 30:.0f} s")
+
+
 def shipped_homes() -> list[dict[str, Any]]:
     """Name, rooms and number of objects (see `ObjectEntry.in_household`) of every home in scenes_mjcf/."""
     from ig2mj.scene import paths
@@ -396,6 +427,7 @@ SUBCOMMANDS: dict[str, Callable[..., int | None]] = {
     "convert": convert,
     "list": list_,
     "images": images,
+    "tour": tour,
     "sheet": sheet,
 }
 

@@ -6,6 +6,7 @@ import math
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from ig2mj.errors import UnknownNameError
 from ig2mj.scene.scene import Scene
@@ -16,6 +17,9 @@ EYE_HEIGHT, FIELD_OF_VIEW, TILT = 1.55, 70.0, -13.0
 
 FROM_WALLS, ABOVE = 0.3, 0.55
 """m that the eye keeps from walls and furniture; what is lower than `ABOVE` the floor does not block the view."""
+
+FROM_DOORS = 0.75
+"""m that the eye keeps from doors, which may be opened."""
 
 DIRECTIONS = 24
 """Directions of view that are tried, around the circle."""
@@ -32,17 +36,8 @@ def room_view(scene: Scene, room: str, fovy: float = FIELD_OF_VIEW) -> FreeView:
     rooms = scene.rooms
     if rooms is None or room not in rooms.names:
         raise UnknownNameError("room", room, rooms.names if rooms is not None else ())
-    index, n = rooms.names.index(room) + 1, rooms.room_map.shape[0]
-    rows, columns = np.nonzero(rooms.room_map == index)
-    cells = (np.stack([columns, rows], 1) + 0.5 - n / 2) * rooms.resolution
-    boxes, targets = _furniture(scene, room)
-    free = np.ones(len(cells), bool)
-    for low, high in boxes:
-        if high[2] > ABOVE:
-            free &= ((cells < low[:2] - FROM_WALLS) | (cells > high[:2] + FROM_WALLS)).any(axis=1)
-    inside = _from_border(rooms.room_map == index, rooms.resolution)[rows, columns] > FROM_WALLS
-    eyes = cells[free & inside] if (free & inside).any() else cells[inside] if inside.any() else cells
-    eyes = eyes[:: max(1, len(eyes) // 300)]
+    cells, targets = _cells(scene, room), _furniture(scene, room)[1]
+    eyes = standing_places(scene, room)
     points = np.concatenate([cells[:: max(1, len(cells) // 200)], np.repeat(targets, 12, axis=0)])
     best = (-1.0, eyes[0], 0.0)
     for eye in eyes:
@@ -67,19 +62,43 @@ def room_view(scene: Scene, room: str, fovy: float = FIELD_OF_VIEW) -> FreeView:
     return FreeView(tuple(at.tolist()), 2.0, math.degrees(turn), TILT, fovy=fovy)
 
 
-def _furniture(scene: Scene, room: str) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.ndarray]:
-    """World boxes of objects of the home, and the middles of fixed ones in the room."""
+def standing_places(scene: Scene, room: str) -> Float[np.ndarray, "n 2"]:
+    """Positions (m) in a room that keep clear of walls and tall furniture, at most 300."""
+    rooms = scene.rooms
+    assert rooms is not None
+    mask, cells = rooms.room_map == rooms.names.index(room) + 1, _cells(scene, room)
+    free = np.ones(len(cells), bool)
+    for low, high, margin in _furniture(scene, room)[0]:
+        if high[2] > ABOVE:
+            free &= ((cells < low[:2] - margin) | (cells > high[:2] + margin)).any(axis=1)
+    inside = _from_border(mask, rooms.resolution)[mask] > FROM_WALLS
+    eyes = cells[free & inside] if (free & inside).any() else cells[inside] if inside.any() else cells
+    return eyes[:: max(1, len(eyes) // 300)]
+
+
+def _cells(scene: Scene, room: str) -> Float[np.ndarray, "n 2"]:
+    """Middles of the cells of a room in the map of rooms, m."""
+    rooms = scene.rooms
+    assert rooms is not None
+    rows, columns = np.nonzero(rooms.room_map == rooms.names.index(room) + 1)
+    return (np.stack([columns, rows], 1) + 0.5 - rooms.room_map.shape[0] / 2) * rooms.resolution
+
+
+def _furniture(scene: Scene, room: str) -> tuple[list[tuple[np.ndarray, np.ndarray, float]], np.ndarray]:
+    """World boxes of objects of the home with the distance to keep from them, and the middles of fixed ones in the
+    room."""
     data = scene.start_data()
     boxes, middles = [], []
     for entry in scene.manifest.objects:
-        if not entry.in_household or entry.category in ("carpet", "window", "door"):
+        if not entry.in_household or entry.category in ("carpet", "window"):
             continue
         body = mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_BODY, entry.bodies[0])
         turn = data.xmat[body].reshape(3, 3)
         middle = data.xpos[body] + turn @ np.asarray(entry.base_link_offset)
         half = np.abs(turn) @ np.asarray(entry.bounding_box) / 2
-        boxes.append((middle - half, middle + half))
-        if entry.fixed and room in entry.rooms:
+        door = entry.category == "door"
+        boxes.append((middle - half, middle + half, FROM_DOORS if door else FROM_WALLS))
+        if entry.fixed and not door and room in entry.rooms:
             middles.append(middle[:2])
     return boxes, np.array(middles).reshape(-1, 2)
 
