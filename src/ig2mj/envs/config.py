@@ -82,6 +82,7 @@ class Overrides(EngineOptions, total=False):
     pool_size: int | None
     augment_starts: int
     image_size: int | None
+    looks: str | None
     sensors: SensorOptions | Mapping[str, Any] | None
     whole_actions: bool
     period: float
@@ -141,6 +142,8 @@ class EnvConfig:
       augment_starts: number of start states made from those (`ig2mj.tasks.mixing`): each object lies as in one of
         them, turned as in another. 0: none, start states are used as they are.
       image_size: height and width of images in pixels; None: those of `sensors`.
+      looks: how the robot's cameras see the home: "day", "night" or "plain" (`ig2mj.load_scene`); None: as `sensors`
+        says, which is plain.
       sensors: settings of the sensors; by default images of 128 x 128 pixels.
       whole_actions: an action has every number of the robot's controller, 1 being its limit, and not only the hands
         that the task moves. For people and their devices.
@@ -171,6 +174,7 @@ class EnvConfig:
     pool_size: int | None = None
     augment_starts: int = 0
     image_size: int | None = None
+    looks: str | None = None
     sensors: SensorOptions = dataclasses.field(default_factory=SensorOptions)
     whole_actions: bool = False
     period: float = ACTION_PERIOD
@@ -212,7 +216,7 @@ class EnvConfig:
 
 
 _KEPT_APART = (
-    *("robot", "worlds", "engine", "grasping", "observations", "sensors", "image_size"),
+    *("robot", "worlds", "engine", "grasping", "observations", "sensors", "image_size", "looks"),
     *("pool", "pool_size", "horizon"),
 )
 

@@ -32,6 +32,7 @@ from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, EnvSetup, setup_activity, setup_bddl, setup_navigation
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
+from ig2mj.scene.scene import check_looks
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.added_objects import object_texts, with_objects
@@ -239,6 +240,8 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     for argument in ("pool_size", "image_size", "horizon"):
         if (given := getattr(config, argument)) is not None:
             whole_number(argument, given)
+    if config.looks is not None:
+        check_looks(config.looks)
     whole_number("augment_starts", config.augment_starts, least=0)
     if config.pool is not None and isinstance(task, Task):
         check_pool(task, config.pool)
@@ -274,6 +277,8 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     settings = config.sensors
     if config.image_size is not None:
         settings = dataclasses.replace(settings, width=config.image_size, height=config.image_size)
+    if config.looks is not None:
+        settings = dataclasses.replace(settings, looks=config.looks)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], known, settings)
     observer = Observer(names, objective, perceived)
     resolved = dataclasses.replace(
@@ -284,6 +289,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         observations=observations,
         sensors=settings,
         image_size=None,
+        looks=None,
         whole_actions=whole,
         # Of a BDDL activity fewer rows than asked for may be good, and its robot stands where the first row wants it.
         pool_size=pool_size if isinstance(task, BddlTask) else rows,
