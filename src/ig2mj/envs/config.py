@@ -209,6 +209,15 @@ class EnvConfig:
         own = {name: value for name, value in values.items() if _differs(value, getattr(default, name))}
         return {**own, **options}
 
+    def sensor_options(self) -> SensorOptions:
+        """`sensors`, with `image_size` and `looks`. Raises UnknownNameError: there are no such looks."""
+        options = self.sensors
+        if self.image_size is not None:
+            options = dataclasses.replace(options, width=self.image_size, height=self.image_size)
+        if self.looks is not None:
+            options = dataclasses.replace(options, looks=SensorOptions.of({"looks": self.looks}).looks)
+        return options
+
     def kept_in_files(self) -> dict[str, Any]:
         """Of `by_name` what files of an environment keep together; each of the rest they keep by its own name."""
         always = {name: getattr(self, name) for name in ("relaxed_thresholds", "split", "pool_size")}

@@ -32,7 +32,6 @@ from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, EnvSetup, setup_activity, setup_bddl, setup_navigation
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
-from ig2mj.scene.scene import check_looks
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.added_objects import object_texts, with_objects
@@ -240,8 +239,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     for argument in ("pool_size", "image_size", "horizon"):
         if (given := getattr(config, argument)) is not None:
             whole_number(argument, given)
-    if config.looks is not None:
-        check_looks(config.looks)
+    settings = config.sensor_options()
     whole_number("augment_starts", config.augment_starts, least=0)
     if config.pool is not None and isinstance(task, Task):
         check_pool(task, config.pool)
@@ -274,11 +272,6 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
     every_number = whole or isinstance(task, BddlTask)  # of the action; some ask hands back
     core = Core(physics, rules, starts, controllers, hands, hand_resets=every_number)
-    settings = config.sensors
-    if config.image_size is not None:
-        settings = dataclasses.replace(settings, width=config.image_size, height=config.image_size)
-    if config.looks is not None:
-        settings = dataclasses.replace(settings, looks=config.looks)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], known, settings)
     observer = Observer(names, objective, perceived)
     resolved = dataclasses.replace(

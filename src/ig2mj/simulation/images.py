@@ -13,14 +13,15 @@ if TYPE_CHECKING:
 def render(simulation: Simulation, camera: Any, width: int, height: int, **options: Any) -> np.ndarray:
     """See `Simulation.render`."""
     from ig2mj.looks import visual_of
-    from ig2mj.viewer import offscreen, state_marks
+    from ig2mj.viewer import offscreen, state_effects, state_marks
 
     visual = visual_of(simulation.scene)
     data = visual.data(*simulation.engine.to_mujoco(simulation.physics, 0))
     model = visual.model
     if simulation.state_options is None or options.get("segmentation"):
         return offscreen.render(model, data, camera, width=width, height=height, **options)
-    found = state_marks.marks(simulation.state_model, simulation.states, simulation.view)
+    world = simulation.state_model, simulation.states, simulation.view
+    found = [*state_marks.marks(*world), *state_effects.effects(*world, time=simulation.time)]
     options.setdefault("decorate", lambda scene: state_marks.draw_marks(scene, found))
     tint = state_marks.tint_of_objects(simulation.state_model, simulation.states)
     with state_marks.Tinter(model, visual.owner).shown(tint):

@@ -20,6 +20,7 @@ from ig2mj.tasks.navigation.objective import NavigationObjective
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.task import Task
 from ig2mj.viewer.offscreen import FreeView, render
+from ig2mj.viewer.state_effects import effects
 from ig2mj.viewer.state_marks import Mark, Tinter, draw_marks, marks, tint_of_objects
 
 SIDES = (50.0, -50.0, 25.0, -25.0, 75.0, -75.0, 110.0, -110.0)
@@ -82,6 +83,7 @@ class EpisodeView:
             camera = camera(world_model, drawn)
         states, view = state.batch.world.states, state.batch.world.view
         found = [*marks(self._states, states, view, self._world), *self._goal_marks(state)]
+        found += effects(self._states, states, view, self._world, float(data.time))
         width, height = self._size
         seen = visual.data(world_model, drawn)
         with self._tinter.shown(tint_of_objects(self._states, states, self._world)):

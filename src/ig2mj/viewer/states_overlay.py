@@ -14,6 +14,7 @@ from ig2mj.states.definitions.temperature import AMBIENT_TEMPERATURE
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.viewer.overlays import Label
+from ig2mj.viewer.state_effects import effects
 from ig2mj.viewer.state_marks import Mark, Tinter, marks, tint_of_objects
 
 CHANGED_BY = 0.5
@@ -60,7 +61,8 @@ class StatesOverlay:
     def marks(self, data: mujoco.MjData) -> list[Mark]:
         """Particles and drops; also tints the objects."""
         self._tinter.apply(tint_of_objects(self._world.state_model, self._world.states))
-        return marks(self._world.state_model, self._world.states, self._world.view)
+        world = self._world.state_model, self._world.states, self._world.view
+        return [*marks(*world), *effects(*world, time=float(data.time))]
 
     def hide(self) -> None:
         """Gives the objects their own colours back."""
