@@ -80,7 +80,7 @@ def _rising(low: np.ndarray, high: np.ndarray, rgba: tuple[float, ...], seed: in
             [middle[0] + sway * math.cos(angle), middle[1] + sway * math.sin(angle), high[2] + 0.01 + RISE * share]
         )
         size = 0.012 + 0.026 * share
-        faded = (*rgba[:3], rgba[3] * (1 - share) * min(1.0, 6 * share + 0.3))
+        faded = (rgba[0], rgba[1], rgba[2], rgba[3] * (1 - share) * min(1.0, 6 * share + 0.3))
         puffs.append(Mark(mujoco.mjtGeom.mjGEOM_ELLIPSOID, (size, size, 1.35 * size), pos, np.eye(3), faded))
     return puffs
 
