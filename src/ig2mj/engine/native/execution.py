@@ -181,10 +181,16 @@ class HostFunction:
 
         with GC_PAUSED:
             traced = jax.make_jaxpr(whole)(shapes)
-            large = any(math.prod(a.shape) > LARGEST for a in (*traced.in_avals, *traced.out_avals))
-            function = PackedFunction(traced, self._name, {} if large else None)  # images are worth several threads
+            images = any(_is_image(a.shape) for a in (*traced.in_avals, *traced.out_avals))
+            function = PackedFunction(traced, self._name, {} if images else None)  # they are worth several threads
         reads = frozenset(fields[i] for i in function.takes if fields[i])
         return _Program([places[i] for i in function.takes], reads, function, structures[0])
+
+
+def _is_image(shape: tuple[int, ...]) -> bool:
+    """Whether an array has the size of images and their axes (worlds, cameras, rows, columns), which relations of all
+    pairs of objects do not have."""
+    return len(shape) > 3 and math.prod(shape) > LARGEST
 
 
 def _is_view(node: Any) -> bool:
