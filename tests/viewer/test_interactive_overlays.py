@@ -187,7 +187,7 @@ def test_the_window_shows_every_step_also_of_a_world_that_hands_out_copies(tiny_
         key_callback(ord("6"))
         return handle
 
-    monkeypatch.setattr(interactive, "_launch", launch_window)
+    monkeypatch.setattr(interactive, "launch_window", launch_window)
     world = CopyingWorld(tiny_home)
     interactive.launch(world, step_time=0.001, key_callback=pressed.append)
     assert (world.steps, handle.synced) == (3, 1 + 3)
@@ -196,6 +196,22 @@ def test_the_window_shows_every_step_also_of_a_world_that_hands_out_copies(tiny_
     names = {handle.user_scn.geoms[i].label for i in range(handle.user_scn.ngeom)}
     assert "apple" not in names  # key 6 switched the names off
     assert dict(zip(*(t.splitlines() for t in handle.texts[-1][0][2:]), strict=True))["time"] == "0.1 s"
+
+
+def test_a_window_shows_the_steps_of_a_program_until_it_is_closed(tiny_home, monkeypatch):
+    handle, keys = FakeHandle(tiny_home.model, pictures=6), []
+    monkeypatch.setattr(interactive, "launch_window", lambda model, data, press, panels: keys.append(press) or handle)
+    world = ig2mj.Simulation(tiny_home, states=None)
+    with world.viewer(step_time=0.001):
+        world.step(count=2)
+        assert handle.synced == 1 + 2, "each control step is drawn"
+        keys[0](32)  # Space: paused, until Space again
+        keys[0](32)
+        world.step(count=20)
+    assert world.time == pytest.approx(22 / 30), "a closed window does not hold the program up"
+    synced = handle.synced
+    world.step()
+    assert handle.synced == synced
 
 
 def test_the_mouse_pushes_the_held_body_and_lets_it_go(tiny_home, data):
@@ -223,7 +239,7 @@ def test_the_mouse_pushes_the_held_body_and_lets_it_go(tiny_home, data):
 
 def test_before_anything_slow_the_window_says_what_is_prepared(tiny_home, monkeypatch):
     handle = FakeHandle(tiny_home.model, pictures=1)
-    monkeypatch.setattr(interactive, "_launch", lambda *_: handle)
+    monkeypatch.setattr(interactive, "launch_window", lambda *_: handle)
     world, shown = CopyingWorld(tiny_home), []
     prepare = lambda: shown.append((handle.synced, handle.texts[-1][0][2:]))  # noqa: E731
     interactive.launch(world, step_time=0.001, prepare=prepare)

@@ -129,7 +129,7 @@ def test_a_session_drives_shows_and_starts_anew(session, monkeypatch):
             key_callback(key)
         return handle
 
-    monkeypatch.setattr(interactive, "_launch", window)
+    monkeypatch.setattr(interactive, "launch_window", window)
     before = np.array(session.state.batch.world.view.agent.base_pos)[0, 0]
     launch(session)
     after = np.array(session.state.batch.world.view.agent.base_pos)[0, 0]

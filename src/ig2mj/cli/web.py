@@ -55,9 +55,10 @@ def run(
       pool: for a scene: pool of start states (`ig2mj sample`).
       worlds: number of worlds; the page shows one of them.
       engine: native, warp or jax. Only on native can objects be dragged.
-      agent: for an environment: zero (no motion), random, expert, or a policy: a file written by `ig2mj train`, or the
-        name of one that ships.
-      robot: for an environment: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first.
+      agent: for an environment: zero (no motion), random, expert, planner (its plan and buttons for what it can do are
+        in the panel), or a policy: a file written by `ig2mj train`, or the name of one that ships.
+      robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: for an environment the task's first, for a
+        scene none. In a scene it plans.
       seed: for an environment: random seed of start states and actions.
       object: {object}.
       task: for a recording: its task, if it is defined in a file of yours; this imports the file.
@@ -114,8 +115,14 @@ def _source(
         raise UnknownNameError("scene, environment or recording", what, (*shipped_homes(), *list_envs()))
     if (recorded or task) and (goal is not None or set or pool is not None):
         raise Ig2mjError("--goal, --set and --pool are for a scene; tasks and recordings have their own")
-    if not task and (agent != "zero" or robot is not None):
-        raise Ig2mjError("--agent and --robot are for a task")
+    if not task and agent != "zero":
+        raise Ig2mjError("--agent is for a task")
+    if recorded and robot is not None:
+        raise Ig2mjError("--robot is for a scene or a task: a recording has its own")
+    if agent == PLANNER or (robot is not None and not task):
+        if worlds > 1 or engine != "native" or set or pool is not None:
+            raise Ig2mjError("a robot that plans is in one world of the native engine, without --set and --pool")
+        return _planned(what, goal, robot or "humanoid", objects, seed)
     if objects and (recorded or pool is not None):
         raise Ig2mjError("--object is for a scene or a task: recordings and pools know their objects")
     if recorded:
@@ -153,6 +160,29 @@ def _task(
     env = make(name, robot, worlds, engine, observations=seen, objects=objects)
     note_changes(env.scene, objects)
     return Acting(env, who_acts(agent, policy, env, seed), seed)
+
+
+PLANNER = "planner"
+"""The agent that plans: its page has the plan, and buttons for primitives."""
+
+
+def _planned(what: str, goal: str | None, robot: str, objects: tuple[str, ...], seed: int) -> Source:
+    from ig2mj.cli.common.objects import note_changes
+    from ig2mj.planning.problem import problem_of
+    from ig2mj.tasks.own_goal import split_goal_name
+    from ig2mj.web.planning import Planned
+
+    home, wanted = split_goal_name(what) or (what, goal)
+    with_goal = wanted is not None or not _is_scene(home)
+    problem = problem_of(home, wanted if with_goal else "(and)", objects)
+    note_changes(problem.scene, objects)
+    return Planned(problem, robot, seed=seed, goal=with_goal)
+
+
+def _is_scene(what: str) -> bool:
+    from ig2mj.scene.paths import SHIPPED_HOMES
+
+    return pathlib.Path(what).exists() or (SHIPPED_HOMES / what).is_dir()
 
 
 def _home(

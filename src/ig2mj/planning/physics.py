@@ -121,6 +121,10 @@ class PhysicsRung:
         """Simulated seconds of a world's present primitive, or of its last one."""
         return self._steps[world] * ACTION_PERIOD
 
+    def asked(self, world: int) -> Step | None:
+        """The primitive that a world's robot began last; None: there was none."""
+        return self._asked[world]
+
     def running(self, world: int) -> Step | None:
         """What a world's robot carries out; None: nothing."""
         return self._asked[world] if self._running[world] is not None else None

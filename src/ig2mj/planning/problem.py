@@ -20,6 +20,7 @@ from ig2mj.planning.steps import PlanningError
 from ig2mj.predicates.compile import CompiledExpression, compile_expression
 from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.literals import AbilityWarning
+from ig2mj.predicates.logic import Expression
 from ig2mj.scene.paths import SHIPPED_HOMES
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.states.model import StateModel
@@ -56,6 +57,12 @@ class Problem:
     def own_goal(self) -> bool:
         """A home and a goal of one's own: there is one start, that of the scene."""
         return split_goal_name(self.task.name) is not None
+
+    def goal_in(self, model: StateModel) -> CompiledExpression:
+        """The goal for another scene of the same household, such as one with robots."""
+        if isinstance(self.task, BddlTask) and self.instead is None:
+            return conditions(self.task.binding).compile_goal(model)
+        return _compiled(model, self.goal.source)
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -117,7 +124,7 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) 
     return Problem(scene.name, scene, model, _compiled(model, goal), goal_task(home, goal), tuple(objects))
 
 
-def _compiled(model: StateModel, goal: str) -> CompiledExpression:
+def _compiled(model: StateModel, goal: str | Expression) -> CompiledExpression:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AbilityWarning)  # what cannot be true is refused when a plan is made
         return compile_expression(model, goal, questions=HostQueries.of(model))

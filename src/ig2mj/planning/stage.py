@@ -102,9 +102,7 @@ class CoreStage:
         self._others = sum(c.action_size for c in controllers[1:])
         self.core = Core(engine, rules, None, controllers, grasping_of(engine, grasping), True)
         self._steps = max(1, round(ACTION_PERIOD / (engine.substeps * engine.timestep)))
-        self.batch = self.core.start(0)
-        if starts is not None:
-            self.load(starts)
+        self.restart(starts)
 
     @property
     def num_worlds(self) -> int:
@@ -120,6 +118,12 @@ class CoreStage:
 
     def snapshot(self, world: int) -> Snapshot:
         return self.core.engine.export(self.batch.world.physics, world)
+
+    def restart(self, starts: Pool | None = None) -> None:
+        """All worlds at the scene's start, or as `load`; robots at theirs."""
+        self.batch = self.core.start(0)
+        if starts is not None:
+            self.load(starts)
 
     def load(self, starts: Pool) -> None:
         """Puts the household of each world into the state of a row; robots stay at their start."""

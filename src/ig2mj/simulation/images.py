@@ -8,6 +8,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from ig2mj.simulation.simulation import Simulation
+    from ig2mj.viewer.live import LiveWindow
 
 
 def render(simulation: Simulation, camera: Any, width: int, height: int, **options: Any) -> np.ndarray:
@@ -30,7 +31,22 @@ def render(simulation: Simulation, camera: Any, width: int, height: int, **optio
 
 def launch_viewer(simulation: Simulation, **options: Any) -> None:
     """See `Simulation.launch_viewer`."""
-    from ig2mj.viewer import interactive, overlays, states_overlay
+    from ig2mj.viewer import interactive
+
+    interactive.launch(simulation, **_options(simulation, options))
+
+
+def viewer(simulation: Simulation, **options: Any) -> LiveWindow:
+    """See `Simulation.viewer`."""
+    from ig2mj.viewer.live import LiveWindow
+
+    window = LiveWindow(simulation.scene, lambda: simulation.data, **_options(simulation, options))
+    return window
+
+
+def _options(simulation: Simulation, options: dict[str, Any]) -> dict[str, Any]:
+    """With overlays of the world's states, and the pace of its steps."""
+    from ig2mj.viewer import overlays, states_overlay
 
     if simulation.state_options is not None:
         shown = [
@@ -39,4 +55,4 @@ def launch_viewer(simulation: Simulation, **options: Any) -> None:
         ]
         options.setdefault("overlays", shown)
     options.setdefault("step_time", simulation.engine.substeps * simulation.engine.timestep)
-    interactive.launch(simulation, **options)
+    return options

@@ -11,10 +11,12 @@ A core with a single world steps it (`ig2mj.worlds.core`), and all that changes 
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import dataclasses
 import functools
 import os
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import jax
@@ -65,6 +67,8 @@ class Simulation(Recorded):
       state_options: how extended states behave; None where only physics is stepped.
       last_sampling: why candidates of the last `set_predicate` were turned down: {reason: how often}.
     """
+
+    _window: Callable[[], None] | None = None
 
     def __init__(
         self,
@@ -244,7 +248,7 @@ class Simulation(Recorded):
     def fork(self) -> Simulation:
         """An independent simulation of the same world, which continues as this one does."""
         new = copy.copy(self)
-        new._recorder, new.last_sampling = None, dict(self.last_sampling)
+        new._recorder, new._window, new.last_sampling = None, None, dict(self.last_sampling)
         new._robots = None
         new._put(physics=self.engine.fork(self.physics))
         return new
@@ -274,7 +278,18 @@ class Simulation(Recorded):
             raise EngineError(
                 f"ctrl has shape {row.shape}; scene '{self.scene.name}' has {self.scene.model.nu} actuators"
             )
-        row, view = None if row is None else row[None], self.view
+        row = None if row is None else row[None]
+        if (window := self._window) is None:
+            return self._steps(row, count)
+        view = self.view
+        for k in range(count):
+            view = self._steps(None if k else row, 1)
+            window()
+        return view
+
+    def _steps(self, row: Float[np.ndarray, "1 n"] | None, count: int) -> PhysicsView:
+        """`step`, checked."""
+        view = self.view
         step, rest = self.core.physics_step, self.core.after_physics  # an interrupted step keeps its physics
         batch, physics, done = self._batch, self.physics, 0
         world, controllers, grasps = batch.world, batch.controllers, batch.grasps
@@ -469,3 +484,23 @@ class Simulation(Recorded):
           MissingDependencyError: there is no display.
         """
         images.launch_viewer(self, **options)
+
+    @contextlib.contextmanager
+    def viewer(self, **options: Any) -> Iterator[None]:
+        """Opens MuJoCo's viewer; during the block every step of this world is seen in it, in real time.
+
+            with simulation.viewer():
+                simulation.agent.do("grasp", "apple_0")
+
+        Args:
+          options: `overlays`; see `ig2mj.viewer.interactive.open_viewer`.
+
+        Raises:
+          MissingDependencyError: there is no display.
+        """
+        with images.viewer(self, **options) as window:
+            self._window = window
+            try:
+                yield
+            finally:
+                self._window = None

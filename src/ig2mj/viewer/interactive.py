@@ -218,9 +218,9 @@ def open_viewer(
     state, mouse = ViewerState(default_overlays(scene) if overlays is None else overlays, paused, more_keys), Mouse()
     keys: queue.SimpleQueue[int] = queue.SimpleQueue()
     visual = visual_of(scene)
-    with _launch(visual.model, visual.data(scene.model, data), keys.put, panels) as handle:
+    with launch_window(visual.model, visual.data(scene.model, data), keys.put, panels) as handle:
         first = camera() if camera is not None else None
-        _look(handle.cam, home_overview(scene, data) if first is None else first)
+        look_at(handle.cam, home_overview(scene, data) if first is None else first)
         handle.set_texts([(mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos.mjGRID_TOPLEFT, *PREPARING)])
         handle.sync()
         if prepare is not None:
@@ -246,7 +246,7 @@ def open_viewer(
                 visual.data(scene.model, data)  # what the window has
                 if marks is not None:
                     handle.opt.flags[:] = marks
-                _look(handle.cam, camera() if camera is not None else None)
+                look_at(handle.cam, camera() if camera is not None else None)
                 state.draw_labels(data, handle.user_scn, Sight.of_window(handle, scene.model.vis.global_.fovy))
                 texts = state.texts(data)
             handle.set_texts(texts)
@@ -261,7 +261,7 @@ def check_display() -> None:
         raise MissingDependencyError(_NO_DISPLAY)
 
 
-def _launch(model: mujoco.MjModel, data: mujoco.MjData, key_callback: Callable[[int], None], panels: bool):
+def launch_window(model: mujoco.MjModel, data: mujoco.MjData, key_callback: Callable[[int], None], panels: bool):
     """MuJoCo's passive viewer, with one-line errors where there can be no window."""
     check_display()
     with warnings.catch_warnings():
@@ -288,7 +288,7 @@ def _sight(cam: mujoco.MjvCamera) -> np.ndarray:
     return np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
 
 
-def _look(cam: mujoco.MjvCamera, view: FreeView | None) -> None:
+def look_at(cam: mujoco.MjvCamera, view: FreeView | None) -> None:
     """Moves the window's camera, where a view is given."""
     if view is not None:
         cam.type = mujoco.mjtCamera.mjCAMERA_FREE

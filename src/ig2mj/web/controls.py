@@ -12,9 +12,10 @@ from typing import Any
 import viser
 
 from ig2mj.web.looks import COLOURS
+from ig2mj.web.planning import Requests
 from ig2mj.web.runner import Runner
 from ig2mj.web.sources import Timeline
-from ig2mj.web.tables import goal_tree, object_table, status
+from ig2mj.web.tables import goal_tree, object_table, plan_table, status
 
 NOTHING = "(click an object, or choose one)"
 READY = "<div style='padding:0 12px 8px;font-size:12.5px;color:#6b7280'>getting ready ...</div>"
@@ -31,6 +32,8 @@ class Controls:
         self.chosen, self.colours = -1, COLOURS[0]
         self.names_shown = self.rooms_shown = False
         self._texts: dict[int, str] = {}
+        self._offered: dict[str, tuple[str, ...]] = {}
+        self._buttons: list[Any] = []
         self._marked = (time.monotonic(), runner.steps)
         self._rate = 0.0
         gui = server.gui
@@ -50,11 +53,16 @@ class Controls:
         if self._source.num_worlds > 1 or self._source.rows:
             with gui.add_folder("Worlds"):
                 self._worlds()
+        self._plan: Any = None
+        if isinstance(self._source, Requests):
+            with gui.add_folder("Robot"):
+                self._robot(self._source)
         self._goal: Any = None
         if self._source.goal is not None:
             with gui.add_folder("Goal"):
                 self._goal = gui.add_html(READY)
-        with gui.add_folder("Object"):
+        self._object_folder = gui.add_folder("Object")
+        with self._object_folder:
             self._object()
         with gui.add_folder("View", expand_by_default=False):
             self._view()
@@ -80,6 +88,41 @@ class Controls:
         async def _(event: Any) -> None:
             if speed.value in SPEEDS:
                 runner.speed = SPEEDS[speed.value]
+
+    def _robot(self, source: Requests) -> None:
+        gui, runner = self._server.gui, self._runner
+        self._plan = gui.add_html("")
+        solvable = self._source.goal is not None
+        buttons = gui.add_button_group("Plan", ("Solve", "Stop") if solvable else ("Stop",))
+
+        @buttons.on_click
+        async def _(_: Any) -> None:
+            if buttons.value == "Solve":
+                runner.request(lambda requests: requests.solve())
+            elif buttons.value == "Stop":
+                runner.request(lambda requests: requests.stop())
+
+    def _offer(self, source: Requests) -> None:
+        """Buttons for what the robot can do with the chosen object."""
+        name = self._source.scene.object_names[self.chosen] if self.chosen >= 0 else ""
+        offered = source.offered(name) if name else {}
+        if offered == self._offered:
+            return
+        for button in self._buttons:
+            button.remove()
+        self._offered, self._buttons = offered, []
+        with self._object_folder:
+            for text, words in offered.items():
+                self._buttons.append(self._button(text, words))
+
+    def _button(self, text: str, words: tuple[str, ...]) -> Any:
+        button, runner = self._server.gui.add_button(text, order=self._states.order - 0.5), self._runner
+
+        @button.on_click
+        async def _(_: Any) -> None:
+            runner.request(lambda requests: requests.ask(words))
+
+        return button
 
     def _recording(self, timeline: Timeline) -> None:
         gui, runner = self._server.gui, self._runner
@@ -172,6 +215,9 @@ class Controls:
         if self.chosen >= 0 and not self._states.content:
             self._states.content = READY
         self._set(self._states, object_table(model, shot, self.chosen) if self.chosen >= 0 else "")
+        if isinstance(self._source, Requests):
+            self._set(self._plan, plan_table(self._source.report))
+            self._offer(self._source)
         if self._goal is not None and self._source.goal is not None:
             self._set(self._goal, goal_tree(self._source.goal, shot))
 

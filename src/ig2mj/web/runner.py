@@ -10,6 +10,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 
 from ig2mj.errors import Ig2mjError
+from ig2mj.web.planning import Requests
 from ig2mj.web.shots import Mailbox
 from ig2mj.web.sources import Source, Timeline
 from ig2mj.web.spring import Drag, pull, release
@@ -102,6 +103,16 @@ class Runner:
                 self._show(jump=True)
 
         self._commands.put(act)
+
+    def request(self, act: Callable[[Requests], None]) -> None:
+        """Asks the robot of a source for something, and lets time pass."""
+
+        def request() -> None:
+            if isinstance(self.source, Requests):
+                act(self.source)
+                self.playing, self.trouble = True, ""
+
+        self._commands.put(request)
 
     def drag(self, who: Hashable, drag: Drag | None) -> None:
         """Fastens a page's spring, moves its end, or (None) lets go."""

@@ -15,6 +15,7 @@ from ig2mj.predicates.tree import Part, tree
 from ig2mj.states.definitions import from_physics
 from ig2mj.states.model import StateModel
 from ig2mj.states.registry import SPECS
+from ig2mj.web.planning import PlanReport
 from ig2mj.web.shots import Shot
 
 _SLOW = (from_physics.ABOVE, from_physics.BELOW, from_physics.BESIDE)
@@ -27,6 +28,7 @@ MOST_PARTS = 200
 _CELL = "padding:1px 8px 1px 0;vertical-align:top"
 _FONT = "font-size:12.5px;line-height:1.45"
 GOOD, BAD, SOFT = "#1b7f3b", "#b3261e", "#6b7280"
+_COLOURS = {"done": GOOD, "now": "#2c5f8a"}
 
 
 def object_rows(model: StateModel, shot: Shot, index: int) -> list[tuple[str, str]]:
@@ -83,6 +85,26 @@ def goal_tree(goal: CompiledExpression, shot: Shot) -> str:
     if len(lines) > MOST_PARTS:
         lines[MOST_PARTS:] = [f"<div style='color:{SOFT}'>... and {len(lines) - MOST_PARTS} more lines</div>"]
     return f"<div style='padding:0 12px 8px;{_FONT}'>{''.join(lines)}</div>"
+
+
+def plan_table(report: PlanReport) -> str:
+    """The steps of a plan with their states, what the robot holds, and how the last request ended."""
+    rows = "".join(_step(*row) for row in report.rows)
+    held = f"in its hands: {', '.join(report.held)}" if report.held else "its hands are empty"
+    notes = [held, *([report.note] if report.note else [])]
+    below = "".join(f"<div style='color:{SOFT};{_FONT}'>{html.escape(note)}</div>" for note in notes)
+    return f"<div style='padding:0 12px 6px'>{rows}{below}</div>"
+
+
+def _step(number: int, text: str, state: str, more: str) -> str:
+    """One step: what is done on the left, how it went on the right, and the reason of a failure below."""
+    failed = state not in ("", *_COLOURS)
+    how = html.escape(state if failed else f"{state} {more}".strip())
+    right = f"<span style='color:{_COLOURS.get(state, BAD)};white-space:nowrap'>{how}</span>"
+    left = f"<span><span style='color:{SOFT}'>{number}</span> {html.escape(text)}</span>"
+    line = f"<div style='display:flex;justify-content:space-between;gap:8px'>{left}{right}</div>"
+    why = f"<div style='color:{SOFT};padding-left:16px'>{html.escape(more)}</div>" if failed and more else ""
+    return f"<div style='{_FONT}'>{line}{why}</div>"
 
 
 def _leaves(part: Part):
