@@ -59,8 +59,30 @@ def test_requests_that_cannot_be_carried_out_are_refused(tiny_home_folder):
         simulation.robots["fetch"]
 
 
-def test_robots_without_hands_and_scenes_without_robots_say_so(tiny_home, tiny_home_folder):
-    with pytest.raises(PlanningError, match="motion of the hands of robot 'turtlebot' cannot be planned"):
-        _ = simulation_of(tiny_home_folder, TurtleBot().at(-1.4, -1.2, 0.0)).agent
+def test_scenes_without_robots_say_so(tiny_home):
     with pytest.raises(EngineError, match="without robots"):
         _ = ig2mj.Simulation(tiny_home).agent
+
+
+@pytest.mark.slow
+def test_a_robot_without_hands_drives_and_says_what_it_lacks(tiny_home_folder):
+    simulation = simulation_of(tiny_home_folder, TurtleBot().at(-1.4, -1.2, 0.0), grasping="assisted")
+    with pytest.raises(PlanningError, match="robot 'turtlebot' has no hand: 'grasp' takes one"):
+        simulation.agent.do("grasp", "apple")
+    done(simulation, "navigate_to stove")
+    base = simulation.view.agent.base_pos[0, 0, :2]
+    assert ((base - simulation.view.object_com[0, simulation.scene.object_index("stove"), :2]) ** 2).sum() < 1.1**2
+
+
+@pytest.mark.slow
+def test_what_another_robot_holds_is_not_taken_from_it(tiny_home_folder):
+    agents = [Humanoid(name="one").at(-1.4, -1.2, 0.0), Humanoid(name="other").at(1.0, -1.4, 0.0)]
+    simulation = ig2mj.Simulation(ig2mj.load_scene(tiny_home_folder, agents=agents), grasping="assisted")
+    one, other = (simulation.robots[name] for name in ("one", "other"))
+    assert one.do("grasp", "apple").done
+    outcome = other.do("grasp", "apple")
+    assert (outcome.reason, outcome.detail) == ("no_grasp", "apple is held by robot 'one' (let it release it first)")
+    assert other.do("toggle_on", "stove").done, "both act in one world"
+    assert one.facts.held == ("apple",)
+    with pytest.raises(EngineError, match="has 2 robots: name one"):
+        _ = simulation.agent

@@ -198,6 +198,7 @@ def test_the_window_shows_every_step_also_of_a_world_that_hands_out_copies(tiny_
     assert dict(zip(*(t.splitlines() for t in handle.texts[-1][0][2:]), strict=True))["time"] == "0.1 s"
 
 
+@pytest.mark.slow
 def test_a_window_shows_the_steps_of_a_program_until_it_is_closed(tiny_home, monkeypatch):
     handle, keys = FakeHandle(tiny_home.model, pictures=6), []
     monkeypatch.setattr(interactive, "launch_window", lambda model, data, press, panels: keys.append(press) or handle)

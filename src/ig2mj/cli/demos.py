@@ -12,6 +12,7 @@ from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 from ig2mj.cli.demos_folder import metrics
 from ig2mj.cli.demos_replay import export, replay
+from ig2mj.cli.demos_video import gallery, video
 
 
 def collect(
@@ -147,4 +148,12 @@ def convert(
     return 0
 
 
-SUBCOMMANDS = {"collect": collect, "replay": replay, "export": export, "metrics": metrics, "convert": convert}
+SUBCOMMANDS = {
+    "collect": collect,
+    "replay": replay,
+    "export": export,
+    "metrics": metrics,
+    "video": video,
+    "gallery": gallery,
+    "convert": convert,
+}

@@ -23,7 +23,7 @@ from ig2mj.demos.environments import RecordedEnvironment, record
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.planning_stage import EnvironmentStage, problem_env
 from ig2mj.errors import EngineError
-from ig2mj.planning.physics import PhysicsRung
+from ig2mj.planning.physics import PhysicsRung, check_robot
 from ig2mj.planning.problem import Problem
 from ig2mj.planning.results import row_of
 from ig2mj.planning.solver import EpisodeResult, Watch, solve, unwatched
@@ -77,6 +77,7 @@ class Episodes:
                 f"{problem.name}: a recording is of the activity's own goal (leave the goal out, or name the home "
                 f"{home} and a goal)"
             )
+        check_robot(robot)
         self.problem, self.planner = problem, planner
         self._seed, self._open, self._recorded = seed, doors_open, None
         rows = max([0, *numbers]) + 1

@@ -11,7 +11,7 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ig2mj.planning.motion_planner import FreeFloor
+from ig2mj.planning.motion_planner import NEAR_START, FreeFloor
 from ig2mj.planning.moves import Program
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.phases import Base, Phase
@@ -19,6 +19,9 @@ from ig2mj.planning.world import PlannedWorld, Stance
 
 BACK = np.arange(0.0, 1.25, 0.1)
 """m before a stance at which there may be room to turn."""
+
+NEAR = 1.0
+"""m from the middle of an object at which a base without hands is near it."""
 
 STEP = 0.1
 """m between stances at which what is held is checked."""
@@ -48,6 +51,26 @@ def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     program = [] if start.xy == (here[0], here[1]) else [shift(start)]
     program += drive(way, stance.yaw)
     return (yield program if end.xy == stance.xy else [*program, shift(stance)])
+
+
+def drive_near(world: PlannedWorld, name: str) -> Generator[Program, str, tuple[str, str]]:
+    """Drives a base without hands to near an object, and faces it; returns reason and detail of a failure."""
+    here, _ = world.base
+    point = world.com(name)[:2]
+    floor = world.floor()
+    cells = floor.within(point, NEAR)
+    if not len(cells):
+        return "no_base", f"there is no free floor within {NEAR:g} m of {name}"
+    middles = floor.occupancy.middles(cells)
+    cost = floor.distances(here, NEAR_START)[tuple(cells.T)] + np.linalg.norm(middles - point, axis=1)
+    best = int(np.argmin(cost))
+    goal = (float(middles[best][0]), float(middles[best][1]))
+    way = floor.way(here, goal) if np.isfinite(cost[best]) else None
+    if way is None:
+        return "no_path", f"no way leads to {name} (open the doors in between)"
+    ahead = point - middles[best]
+    reason = yield drive(way, float(np.arctan2(ahead[1], ahead[0])))
+    return reason, ""
 
 
 def _backed(world: PlannedWorld, stance: Stance, standing: FreeFloor, turning: FreeFloor) -> Stance | None:

@@ -9,10 +9,14 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.agents.humanoid.robot import Humanoid
+from ig2mj.agents.registry import find_robot
+from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.planning import execution
 from ig2mj.planning.bodies import HoveringBody, body_of
 from ig2mj.planning.domain import Domain
@@ -30,11 +34,19 @@ MOST_STEPS = 3000
 """Agent steps of one primitive, 300 s, after which it fails with "timeout"."""
 
 
+def check_robot(robot: str | TaskRobot) -> None:
+    """Raises PlanningError: motion of the hands of a robot cannot be planned."""
+    name, body = find_robot(robot)
+    if not isinstance(body, Humanoid):
+        raise PlanningError(f"motion of the hands of robot '{name}' cannot be planned (take humanoid)")
+
+
 class PhysicsRung:
     """See the module's text and `ig2mj.planning.rung.Rung`.
 
     Attributes:
-      stage: the worlds. body: how programs move the robot. domain: constants. watch: called after every agent step.
+      stage: the worlds. body: how programs move the robot; one without planned hands carries out `navigate_to`.
+      domain: constants. watch: called after every agent step.
     """
 
     name = "physics"
@@ -47,13 +59,10 @@ class PhysicsRung:
           query: a world of the stage's scene to sample spots in; None: a new one.
 
         Raises:
-          PlanningError: the robot has no hands that planned motion can move.
+          PlanningError: the robot has no base that planned ways can move.
         """
-        body = body_of(stage.scene, stage.controller, stage.agent)
-        if not isinstance(body, HoveringBody):
-            name = stage.scene.tables.agent_names[stage.agent]
-            raise PlanningError(f"motion of the hands of robot '{name}' cannot be planned (the humanoid's can)")
-        self.stage, self.body = stage, body
+        self.stage, self.body = stage, body_of(stage.scene, stage.controller, stage.agent)
+        body = self.body
         self.domain = Domain(stage.model, len(body.hands))
         self._planner = MotionPlanner(stage.scene, stage.agent)
         self._query = query
@@ -77,17 +86,48 @@ class PhysicsRung:
         if self._query is None:
             self._query = SceneQuery(self.stage.scene)
         rng = np.random.default_rng([self._seed, self._numbers[world], self._count[world]])
-        return PlannedWorld(self.stage, self.body, self.domain, self._planner, self._query, world, rng)
+        body: Any = self.body  # without hands, it is asked for its base alone
+        return PlannedWorld(self.stage, body, self.domain, self._planner, self._query, world, rng)
 
     def facts(self, world: int) -> Facts:
         return self.world(world).facts
 
+    def check(self, step: Step) -> None:
+        """Whether the robot can be asked for a primitive.
+
+        Raises:
+          UnknownNameError: no such object or room. PlanningError: the robot lacks what the primitive takes.
+        """
+        if step.primitive != "navigate_to" and not isinstance(self.body, HoveringBody):
+            name = self.stage.scene.tables.agent_names[self.stage.agent]
+            lacks = "has no hand" if not len(self.body.hands) else "has no hand whose motion can be planned"
+            raise PlanningError(f"robot '{name}' {lacks}: '{step.primitive}' takes one (humanoid has two)")
+        rooms = self.domain.model.tables.room_names
+        for name in step.arguments:
+            if name not in rooms:
+                self.domain.index(name)
+
     def begin(self, world: int, step: Step) -> None:
+        """See `Rung.begin`. Raises as `check`."""
+        self.check(step)
         self._count[world] += 1
         self._steps[world], self._planning[world] = 0, 0.0
         self._asked[world] = step
         self._running[world] = primitive(self.world(world), step)
+        if taken := self._taken(world, step):
+            self._end(world, Outcome("no_grasp", taken))
+            return
         self._next(world, None)
+
+    def _taken(self, world: int, step: Step) -> str:
+        """What another robot holds of what a primitive needs, in words; "" for nothing."""
+        tables, held = self.domain.model.tables, np.asarray(self.stage.view.held)[world]
+        others = [h for h in range(len(held)) if h not in self.body.hands]
+        for name in step.arguments if step.primitive != "navigate_to" and others else ():
+            if name in tables.object_names and (hands := np.flatnonzero(held[others, self.domain.index(name)])).size:
+                robot = tables.agent_names[int(tables.hand_agent[others[int(hands[0])]])]
+                return f"{name} is held by robot '{robot}' (let it release it first)"
+        return ""
 
     def _next(self, world: int, reason: str | None) -> None:
         """The next program of a world's primitive, or its outcome."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ig2mj.planning.driving import go
+from ig2mj.planning.bodies import WheeledBody
+from ig2mj.planning.driving import drive_near, go
 from ig2mj.planning.grasping import grasp, release
 from ig2mj.planning.moves import Primitive, PrimitiveFailed
 from ig2mj.planning.opening import set_open
@@ -41,7 +42,9 @@ def _guarded(inner: Primitive) -> Primitive:
 
 
 def navigate_to(world: PlannedWorld, step: Step) -> Primitive:
-    """To where a hand reaches the object."""
+    """To where a hand reaches the object; a robot without hands that are planned, to near it."""
+    if isinstance(world.body, WheeledBody):
+        return Outcome(*(yield from drive_near(world, step.object)))
     point, reason = world.com(step.object), "no_base"
     hands = range(len(world.body.hands))
     for stance in world.stances(max(hands), point, world.floor(), AWAY):

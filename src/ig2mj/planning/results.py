@@ -25,12 +25,16 @@ class ResultFile:
           file: of lines, or None: nothing is kept on disk. conditions: of the episodes; lines of other conditions stay.
 
         Raises:
-          InputError: a line of the file is not a result.
+          InputError: a line of the file is not a result, or it cannot be written.
         """
         self._file, self._conditions = file, dict(conditions)
         self.kept: dict[int, EpisodeResult] = {}
-        if file is None or not file.exists():
+        if file is None:
             return
+        try:
+            file.touch()
+        except OSError as e:
+            raise InputError(file, f"cannot be written: {e.strerror}", fix="choose another place") from e
         for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
             try:
                 row = json.loads(line)

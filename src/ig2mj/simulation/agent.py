@@ -113,10 +113,7 @@ class Agent:
           by friction alone.
         """
         step = make_step(primitive, arguments)
-        tables = self._simulation.scene.tables
-        for name in arguments:
-            if name not in tables.room_names:
-                self.rung.domain.index(name)
+        self.rung.check(step)
         if self._simulation.core.grasping is None and primitive not in ("navigate_to", "toggle_on", "toggle_off"):
             raise PlanningError(
                 f"'{primitive}' needs hands that take hold of things: Simulation(..., grasping='assisted')"

@@ -287,7 +287,7 @@ class Simulation(Recorded):
             window()
         return view
 
-    def _steps(self, row: Float[np.ndarray, "1 n"] | None, count: int) -> PhysicsView:
+    def _steps(self, row: np.ndarray | None, count: int) -> PhysicsView:
         """`step`, checked."""
         view = self.view
         step, rest = self.core.physics_step, self.core.after_physics  # an interrupted step keeps its physics
