@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -86,8 +85,7 @@ class PhysicsRung:
         if self._query is None:
             self._query = SceneQuery(self.stage.scene)
         rng = np.random.default_rng([self._seed, self._numbers[world], self._count[world]])
-        body: Any = self.body  # without hands, it is asked for its base alone
-        return PlannedWorld(self.stage, body, self.domain, self._planner, self._query, world, rng)
+        return PlannedWorld(self.stage, self.body, self.domain, self._planner, self._query, world, rng)
 
     def facts(self, world: int) -> Facts:
         return self.world(world).facts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -11,7 +12,7 @@ from jaxtyping import Bool, Float
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.bodies import HoveringBody, Senses, grip_of, sense
+from ig2mj.planning.bodies import Senses, grip_of, sense
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
@@ -92,7 +93,7 @@ class PlannedWorld:
     """
 
     stage: Stage
-    body: HoveringBody
+    body: Any  # HoveringBody; a robot that only drives has a WheeledBody
     domain: Domain
     planner: MotionPlanner
     query: SceneQuery
