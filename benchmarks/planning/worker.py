@@ -18,6 +18,7 @@ from ig2mj.cluster.reporting import end_with_parent, report
 from ig2mj.demos.solving import Episodes
 from ig2mj.errors import Ig2mjError
 from ig2mj.planning.domain import Domain
+from ig2mj.planning.kinematic import kinematic_episodes
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.problem import Problem, problem_of
 from ig2mj.planning.results import row_of
@@ -93,6 +94,13 @@ def episodes(
     if args.rung == "symbolic":
         pool = problem.pool(args.split, max(args.count, max(numbers) + 1))
         for at, rung in symbolic_episodes(planner.domain, problem.scene, pool, numbers, args.seed):
+            report(event="begin", start=at)
+            yield at, solve(planner, rung, seconds=args.seconds, watch=watch)[0]
+        return
+    if args.rung == "kinematic":
+        pool = problem.pool(args.split, max(args.count, max(numbers) + 1))
+        start = (planner.domain, problem, pool, numbers, args.robot, args.seed, args.doors == "open")
+        for at, rung in kinematic_episodes(*start):
             report(event="begin", start=at)
             yield at, solve(planner, rung, seconds=args.seconds, watch=watch)[0]
         return

@@ -25,7 +25,7 @@ def run(
     robot: str = "humanoid",
     episodes: int = 1,
     worlds: int = 1,
-    rung: Literal["symbolic", "physics"] = "physics",
+    rung: Literal["symbolic", "kinematic", "physics"] = "physics",
     doors: Literal["open", "shut"] = "open",
     split: str = "held_out",
     seed: int = 0,
@@ -48,8 +48,9 @@ def run(
       robot: which robot acts.
       episodes: number of start states, each solved once.
       worlds: number of episodes that are solved side by side, in physics.
-      rung: physics: the robot acts; symbolic: states are set instead.
-      doors: whether doors between rooms that the goal does not name stand open at the start, in physics.
+      rung: physics: the robot acts; kinematic: its motion is planned and checked, and states are set; symbolic: states
+        are set without motion.
+      doors: whether doors between rooms that the goal does not name stand open at the start, but for the symbolic rung.
       split: start states of the activity: train or held_out.
       seed: of what is sampled; the same seed gives the same result.
       seconds: wall time of an episode after which it ends.
@@ -80,7 +81,7 @@ def run(
     from ig2mj.tasks.pools import SEEDS
 
     if script is not None:
-        if goal is not None or record or video or out or rung == "symbolic" or max(episodes, worlds) > 1:
+        if goal is not None or record or video or out or rung != "physics" or max(episodes, worlds) > 1:
             raise Ig2mjError("--script takes a home, --robot, --seed, --object and --json alone")
         from ig2mj.cli.common.scripts import run_script
 
@@ -93,7 +94,7 @@ def run(
         raise Ig2mjError(f"--worlds {worlds}: at least one is needed")
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
-    if (record or video) and rung == "symbolic":
+    if (record or video) and rung != "physics":
         raise Ig2mjError("--record and --video are of a robot that acts: use --rung physics")
     for file in (out, record):
         if file is not None:
@@ -109,7 +110,7 @@ def run(
     domain = domain_of(problem, robot)
     planner = TaskPlanner(domain, problem.goal)
     conditions = {"problem": problem.name, "goal": goal, "robot": robot, "rung": rung, "split": split, "seed": seed}
-    conditions |= {"doors": doors} if rung == "physics" else {}
+    conditions |= {"doors": doors} if rung != "symbolic" else {}
     results = ResultFile(out, conditions)
     wanted = [n for n in range(episodes) if n not in results.kept]
     if record is not None and len(wanted) < episodes:
@@ -117,7 +118,7 @@ def run(
     options = {"robot": robot, "worlds": worlds, "split": split, "seed": seed, "doors_open": doors == "open"}
     try:
         with StepTable(problem.name) as table:
-            solved = _symbolic if rung == "symbolic" else _physical
+            solved = {"symbolic": _symbolic, "kinematic": _kinematic, "physics": _physical}[rung]
             for number, result in solved(problem, planner, wanted, options, table, seconds, record, video):
                 results.add(number, result)
     except KeyboardInterrupt:
@@ -158,6 +159,26 @@ def _symbolic(
 
     pool = problem.pool(options["split"], max([0, *numbers]) + 1)
     for number, rung in symbolic_episodes(planner.domain, problem.scene, pool, numbers, options["seed"]):
+        table.begin([number])
+        yield number, solve(planner, rung, seconds=seconds, watch=table.watch)[0]
+
+
+def _kinematic(
+    problem: Problem,
+    planner: TaskPlanner,
+    numbers: Sequence[int],
+    options: dict[str, Any],
+    table: StepTable,
+    seconds: float,
+    *_: object,
+) -> Iterator[tuple[int, EpisodeResult]]:
+    """Episodes in which motion is planned, and states are set. `options`: of `ig2mj.demos.solving.Episodes`."""
+    from ig2mj.planning.kinematic import kinematic_episodes
+    from ig2mj.planning.solver import solve
+
+    pool = problem.pool(options["split"], max([0, *numbers]) + 1)
+    robot = {name: options[name] for name in ("robot", "seed", "doors_open")}
+    for number, rung in kinematic_episodes(planner.domain, problem, pool, numbers, **robot):
         table.begin([number])
         yield number, solve(planner, rung, seconds=seconds, watch=table.watch)[0]
 

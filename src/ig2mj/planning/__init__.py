@@ -6,6 +6,7 @@ after each. docs/design/planning.md describes how they fit together.
 
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
+from ig2mj.planning.kinematic import KinematicRung
 from ig2mj.planning.motion_planner import BasePlan, HandPlan, MotionPlanner
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.problem import Problem, problem_of
@@ -23,6 +24,7 @@ __all__ = [
     "EpisodeResult",
     "Facts",
     "HandPlan",
+    "KinematicRung",
     "MotionPlanner",
     "Outcome",
     "PhysicsRung",

@@ -24,6 +24,7 @@ from ig2mj.predicates.logic import Atom
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.many import make_sampler
 from ig2mj.sampling.placement import Budget, Rejections
+from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.row import RowSampler
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
@@ -100,6 +101,35 @@ class SymbolicRung:
                 own.held.remove(step.object)
         return Outcome()
 
+    def lacking(self, world: int, step: Step) -> str:
+        """What of a primitive's preconditions is false in a world, in words."""
+        return self._lacking(step, self.facts(world), self._worlds[world].held)
+
+    def state(self, world: int) -> tuple[Snapshot, ExtendedStates]:
+        """Physics without, states with a world axis of 1, of a world now."""
+        own = self._worlds[world]
+        return own.physics, own.states
+
+    def show(self, world: int) -> SceneQuery:
+        """The sampler's world, in the state of a world."""
+        self._sampler.query.load(self._worlds[world].physics)
+        return self._sampler.query
+
+    def hold(self, world: int, name: str) -> None:
+        """From now on, the object counts as held."""
+        self._worlds[world].held.append(name)
+
+    def let_go(self, world: int, name: str, physics: Snapshot) -> None:
+        """An object is not held any more; `physics`: of the world from now on."""
+        self._worlds[world].held.remove(name)
+        self._worlds[world].physics = physics
+
+    def make_true(self, world: int, step: Step, conditions: Sequence[Condition] | None = None) -> Outcome | None:
+        """Changes a world so that what a step adds, or other conditions, hold; the failure, or None."""
+        own = self._worlds[world]
+        own.count += 1
+        return self._make_true(world, own, step, conditions)
+
     def _lacking(self, step: Step, facts: Facts, held: Sequence[str]) -> str:
         """What of the primitive's preconditions is false, in words."""
         name, kind = step.object, step.primitive
@@ -156,14 +186,17 @@ class SymbolicRung:
                 found.append(Atom(predicate, (other, target)))
         return [condition_of(atom) for atom, holds in facts.truth(found).items() if holds]
 
-    def _make_true(self, world: int, own: _SymbolicWorld, step: Step) -> Outcome | None:
+    def _make_true(
+        self, world: int, own: _SymbolicWorld, step: Step, conditions: Sequence[Condition] | None = None
+    ) -> Outcome | None:
         """The failure, or None: the world is changed so that what the step adds holds."""
         rng = np.random.default_rng([self._seed, self._first + world, own.count])
         rejected: Rejections = collections.Counter()
         self._sampler.start_from(own.physics, own.states)
         try:
             around = self._around(step, self.facts(world), own.held)
-            row = self._sampler.sample(list(step.adds), rng, Budget(WORK), rejected, around=around)
+            wanted = list(step.adds if conditions is None else conditions)
+            row = self._sampler.sample(wanted, rng, Budget(WORK), rejected, around=around)
         except (StateError, AbilityError) as e:
             return Outcome("not_true_after", str(e))
         if row is None:
