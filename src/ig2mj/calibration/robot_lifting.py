@@ -49,6 +49,9 @@ SPREAD, TURN = 0.012, math.radians(12)
 HOVER = 0.10
 """m between the gripper and the cube before it approaches."""
 
+STRAIGHT = 4
+"""Parts of the way to the cube, each with a posture of its own at its end."""
+
 MOST_BEND = 1.0
 """rad or m: by which a joint moves between the cube and `HOVER` before it."""
 
@@ -138,11 +141,17 @@ def lift(
         grasp, _, _ = arm.solve(q, spot, approach, axis)
         before, _, _ = arm.solve(grasp, spot - HOVER * approach, approach, axis)
         raised, _, _ = arm.solve(grasp, spot + RAISE, approach, axis)
+        way, at = [], before
+        for left in np.linspace(1, 0, STRAIGHT + 1)[1:]:  # joints that turn evenly would lead the hand along an arc
+            at, _, _ = arm.solve(at, spot - left * HOVER * approach, approach, axis)
+            way.append(at)
         move, reason = functools.partial(_move, simulation, hand), ""
-        for stage, (posture, grip, settle) in enumerate(
-            ((before, 1.0, 3), (grasp, 1.0, 5), (grasp, -1.0, 10), (raised, -1.0, 10))
+        for stage, (postures, grip, settle) in enumerate(
+            (([before], 1.0, 3), (way, 1.0, 5), (way[-1:], -1.0, 10), ([raised], -1.0, 10))
         ):
-            move(posture, grip, settle)
+            for posture in postures[:-1]:
+                move(posture, grip, 0)
+            move(postures[-1], grip, settle)
             watch(simulation, f"{len(result.lifted)}_{stage}")
             reason = reason or _fault(stage, simulation, hand, loose, spot)
         result.lifted.append(float(simulation.object_pose(loose)[0][2]) > low + LIFT)
@@ -253,7 +262,7 @@ def _places(
 
 
 def _move(simulation: Simulation, hand: Hand, q: np.ndarray, grip: float, settle: int = 3, speed: float = 0.5) -> None:
-    """Brings the arm's servos to q, all joints at once, and waits."""
+    """Brings the arm's servos to q, all joints at once, and waits for `settle` agent steps."""
     robots, robot = simulation.robots, simulation.scene.agents[0]
     assert isinstance(robot, UrdfRobot)
     places = [robot.layout.arm.index(name) for name in hand.joints]
@@ -266,4 +275,5 @@ def _move(simulation: Simulation, hand: Hand, q: np.ndarray, grip: float, settle
         share = min(1.0, speed / max(float(np.abs(left / speeds).max()), 1e-9))
         moves = {**dict(zip(hand.joints, left / speeds * share, strict=True)), hand.close: grip}
         robots.act(np.array([moves.get(name, 0.0) for name in robots.action_names]))
-    robots.act(np.array([grip if name == hand.close else 0.0 for name in robots.action_names]), settle)
+    if settle:
+        robots.act(np.array([grip if name == hand.close else 0.0 for name in robots.action_names]), settle)
