@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ig2mj.tasks.custom.view import TaskView
     from ig2mj.tasks.task import Acts
     from ig2mj.worlds import Worlds
+    from ig2mj.worlds.randomize import Randomize
 
     __version__: str
 
@@ -32,6 +33,7 @@ __all__ = [
     "EnvState",
     "Environment",
     "Policy",
+    "Randomize",
     "Scene",
     "Simulation",
     "StartWorld",
@@ -54,6 +56,7 @@ _HOME = {
     "EnvState": "ig2mj.envs.state",
     "Environment": "ig2mj.envs.environment",
     "Policy": "ig2mj.learn.policies",
+    "Randomize": "ig2mj.worlds.randomize",
     "Scene": "ig2mj.scene.scene",
     "Simulation": "ig2mj.simulation",
     "StartWorld": "ig2mj.tasks.custom.start",

@@ -178,6 +178,8 @@ def _entries(header: Mapping[str, Any]) -> list[tuple[str, str, str, str]] | Non
 
 def is_plain(value: object) -> bool:
     """Whether JSON can represent the value."""
+    if isinstance(value, Mapping):
+        return all(isinstance(key, str) and is_plain(inner) for key, inner in value.items())
     return isinstance(value, str | int | float | bool | None) or (
         isinstance(value, list | tuple) and all(map(is_plain, value))
     )

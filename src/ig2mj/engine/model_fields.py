@@ -37,7 +37,7 @@ class ModelFields:
       eq_data: parameters of equality constraints.
       body_mass, body_inertia (kg, kg m2), body_subtreemass, body_invweight0, dof_invweight0, dof_M0: masses, and what
         MuJoCo derives from them; to be made by `with_masses`.
-      geom_friction: sliding, torsional, rolling.
+      geom_friction: sliding, torsional, rolling. dof_damping: N s/m or N m s/rad.
       geom_rgba, mat_rgba: colours, 0..1; seen where MuJoCo draws (`Engine.to_mujoco`).
       cam_pos, cam_quat: poses of cameras in their bodies' frames (m, w-x-y-z).
     """
@@ -50,6 +50,7 @@ class ModelFields:
     dof_invweight0: Float[Array, "*W nv"] | None = None
     dof_M0: Float[Array, "*W nv"] | None = None
     geom_friction: Float[Array, "*W G 3"] | None = None
+    dof_damping: Float[Array, "*W nv"] | None = None
     geom_rgba: Float[Array, "*W G 4"] | None = None
     mat_rgba: Float[Array, "*W M 4"] | None = None
     cam_pos: Float[Array, "*W C 3"] | None = None
@@ -62,7 +63,7 @@ NAMES: tuple[str, ...] = tuple(field.name for field in dataclasses.fields(ModelF
 MASSES = ("body_mass", "body_inertia", "body_subtreemass", "body_invweight0", "dof_invweight0", "dof_M0")
 """Fields that belong together: an engine has all of them or none, and they are written together."""
 
-MOVING = ("eq_data", *MASSES, "geom_friction")
+MOVING = ("eq_data", *MASSES, "geom_friction", "dof_damping")
 """Fields that a physics step reads."""
 
 

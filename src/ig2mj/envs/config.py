@@ -25,6 +25,7 @@ from ig2mj.scene.scene import Objects
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.pool import Pool
+from ig2mj.worlds.randomize import Randomize
 
 if TYPE_CHECKING:
     from ig2mj.engine.snapshot import Snapshot
@@ -90,6 +91,7 @@ class Overrides(EngineOptions, total=False):
     variant: int
     home: str | os.PathLike | None
     objects: Objects
+    randomize: Randomize | Mapping[str, Any] | None
     engine_options: EngineOptions
 
 
@@ -158,6 +160,7 @@ class EnvConfig:
         with a place if it has one (`ig2mj.load_scene`). In the paper's activities and in tasks of your own,
         "obj/mug@on_top:breakfast_table_0" is a further condition of the start states: the mug is in another place in
         each of them. They are sampled on first use.
+      randomize: what differs between episodes, axis by axis (`ig2mj.Randomize`); None: nothing.
       engine_options: see `EngineOptions`.
     """
 
@@ -182,6 +185,7 @@ class EnvConfig:
     variant: int = 0
     home: str | os.PathLike | None = None
     objects: Objects = ()
+    randomize: Randomize | None = None
     engine_options: EngineOptions = dataclasses.field(default_factory=lambda: EngineOptions())
 
     def override(self, overrides: Mapping[str, Any] | None = None, **more: Any) -> EnvConfig:
@@ -193,6 +197,8 @@ class EnvConfig:
         values = current_names({**(overrides or {}), **more}, warn=True)
         if "sensors" in values:
             values["sensors"] = _sensors(self.sensors, values["sensors"])
+        if "randomize" in values:
+            values["randomize"] = Randomize.of(values["randomize"])
         options = _mapping("engine_options", values.pop("engine_options", {}))
         options = {**options, **{name: values.pop(name) for name in list(values) if name in ENGINE_OPTIONS}}
         for name in values:
@@ -221,7 +227,8 @@ class EnvConfig:
     def kept_in_files(self) -> dict[str, Any]:
         """Of `by_name` what files of an environment keep together; each of the rest they keep by its own name."""
         always = {name: getattr(self, name) for name in ("relaxed_thresholds", "split", "pool_size")}
-        return always | {name: value for name, value in self.by_name().items() if name not in _KEPT_APART}
+        own = {name: value for name, value in self.by_name().items() if name not in _KEPT_APART}
+        return always | own | ({} if self.randomize is None else {"randomize": self.randomize.as_dict()})
 
 
 _KEPT_APART = (

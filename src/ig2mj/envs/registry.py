@@ -268,10 +268,13 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     rows = starts.size
     if config.augment_starts and isinstance(task, Task):
         starts = mixed_pool(task, scene, starts, config.augment_starts)
-    physics = make_engine(engine, scene, config.worlds, **config.engine_options)
+    options, differs = config.engine_options, config.randomize
+    if differs is not None:
+        options = {**options, "model_fields": (*options.get("model_fields", ()), *differs.model_fields)}
+    physics = make_engine(engine, scene, config.worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
     every_number = whole or isinstance(task, BddlTask)  # of the action; some ask hands back
-    core = Core(physics, rules, starts, controllers, hands, hand_resets=every_number)
+    core = Core(physics, rules, starts, controllers, hands, hand_resets=every_number, randomize=config.randomize)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], known, settings)
     observer = Observer(names, objective, perceived)
     resolved = dataclasses.replace(

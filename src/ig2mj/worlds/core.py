@@ -50,6 +50,7 @@ from ig2mj.worlds.hands import Hands, Held
 from ig2mj.worlds.incremental import rules_step
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds
+from ig2mj.worlds.randomize import Randomize
 from ig2mj.worlds.rules import Outcome, Rules, States
 from ig2mj.worlds.starts import Starts, checked_mask
 
@@ -85,6 +86,7 @@ class Core:
         controllers: Sequence[Controller] = (),
         grasping: Grasping | None = None,
         hand_resets: bool = False,
+        randomize: Randomize | None = None,
     ):
         """Binds an engine to the rules of its scene.
 
@@ -96,13 +98,14 @@ class Core:
           grasping: how hands take hold of objects; None: by friction alone.
           hand_resets: hands that an action asks back are teleported where they are out of reach; makes compiled
             programs larger.
+          randomize: what differs between episodes; the engine must have its `model_fields`.
         """
         self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
         self.grasping, self.hands = grasping, Hands(engine, grasping, self.controllers)
         self.cameras = AgentCameras(engine, self.controllers)
         self.hand_resets = HandResets(engine, self.controllers, hand_resets)
         self.controls = Controls(engine, self.controllers)
-        self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
+        self.starts = Starts(engine, rules.initial if rules is not None else None, pool, randomize)
         self.physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
         self._count = guards.counter(engine, lambda: self.starts.floor, engine.substeps * engine.timestep)
         self._select = engine.compile(select_worlds)
@@ -317,7 +320,7 @@ class Core:
         """`reset`, not compiled."""
         world = batch.world
         episode, key, row = self.starts.draw(batch.seed, batch.number, batch.episode, mask)
-        rows = self.starts.pool.rows(row)
+        rows = self.starts.rows(row, key)
         physics = self.engine.load(world.physics, rows.physics, mask)
         zero = jnp.zeros_like(world.step), jnp.zeros_like(world.time)
         started = (rows.states, key, *zero, self.controls.first(), self.hands.read(physics))

@@ -22,13 +22,15 @@ from ig2mj.worlds import guards
 from ig2mj.worlds.plugin_states import completed
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds, episode_keys, pick_rows
+from ig2mj.worlds.randomize import Randomization, Randomize
 
 
 class Starts:
     """Rows to start from, and the floor below which an object has left the house. Made when they are first needed."""
 
-    def __init__(self, engine: Engine, initial: Any, pool: Pool | None):
+    def __init__(self, engine: Engine, initial: Any, pool: Pool | None, randomize: Randomize | None = None):
         """`initial`: states of one world, for where no pool is given: then all start where the engine's reset does.
+        `randomize`: what differs between episodes.
 
         Raises EngineError: the pool is of another scene, of other added objects, or of the scene before it was changed.
         """
@@ -41,6 +43,8 @@ class Starts:
             )
         self._engine, self._initial, self._given = engine, initial, pool
         self._draw = engine.compile(self._draw_fn)
+        self._randomize = randomize
+        self._fields = engine.compile(lambda key: self.randomization.fields(key))
 
     @functools.cached_property
     def pool(self) -> Pool:
@@ -51,6 +55,19 @@ class Starts:
         elif self._initial is not None:
             pool = dataclasses.replace(pool, states=completed(pool.states, self._initial))
         return self._engine.constants(pool)
+
+    @functools.cached_property
+    def randomization(self) -> Randomization:
+        """What draws it; made when the first episode begins."""
+        assert self._randomize is not None
+        return Randomization(self._randomize, self._engine.scene.model, self._engine.tables)
+
+    def rows(self, row: Int[Array, "W"], key: UInt[Array, "W 2"]) -> Pool:
+        """Rows of the pool, with the fields of the model that episodes with these keys have."""
+        rows = self.pool.rows(row)
+        if self._randomize is None:
+            return rows
+        return dataclasses.replace(rows, physics=dataclasses.replace(rows.physics, model_fields=self._fields(key)))
 
     @functools.cached_property
     def floor(self) -> Float[np.ndarray, "O"]:
