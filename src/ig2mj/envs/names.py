@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
-from ig2mj.scene.paths import shipped_homes
 from ig2mj.tasks.registry import REGISTERED, TASKS, split_reference
 
 NAMESPACE, VERSION = "ig2mj", 0
@@ -59,6 +58,8 @@ def register(gymnasium: Any) -> None:
 
 def unknown_environment(name: str, known: Sequence[str]) -> Ig2mjError:
     """The error of a name that is no environment's. known: names of environments."""
+    from ig2mj.scene.paths import shipped_homes  # `import ig2mj` reads this module, and loads no MuJoCo
+
     also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`), tasks of yours FILE.py:NAME"
     if name in shipped_homes() or pathlib.Path(name).is_dir():
         goal = f'"goal/{name} GOAL"'
