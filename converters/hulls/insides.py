@@ -42,7 +42,7 @@ LEAST_OPEN = 0.5
 
 CLOSED = frozenset(
     """
-    atomizer beer carton catsup coffee_cup coffee_pouch cologne conditioner cream cruet detergent flour honey
+    atomizer beer blender carton catsup coffee_cup coffee_pouch cologne conditioner cream cruet detergent flour honey
     jam jar juice kettle lotion mayonnaise medicine milk olive_oil paint pepper_grinder perfume pop
     powder_bottle protein_powder puree salt shampoo soap soup spaghetti_sauce sugar_jar sunscreen teapot
     toothpaste vinegar water wine_bottle yogurt

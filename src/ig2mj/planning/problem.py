@@ -104,7 +104,7 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) 
         scene = load_bound(task.binding)
         model = StateModel.of_manifest(scene.tables, scene.manifest)
         compiled = conditions(task.binding).compile_goal(model) if goal is None else _compiled(model, goal)
-        return Problem(short, scene, model, compiled, task, task.binding.additions, goal)
+        return Problem(short, scene, model, compiled, task, task.binding.requested, goal)
     if short in TASKS:
         task = load_task(short)
         if not isinstance(task, Task):

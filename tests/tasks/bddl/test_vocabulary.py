@@ -127,6 +127,9 @@ def test_what_no_state_expresses_is_named(objects, condition, lacking):
         ("carton__of__milk.n.01", "milk"),  # what is in it
         ("bottle__of__vodka.n.01", "bottle.n.01"),  # else what it is in
         ("half__apple.n.01", "half_apple"),  # its own category
+        ("olive_oil__bottle.n.01", "olive_oil"),  # a container of what is in it
+        ("acetone__bottle.n.01", "bottle"),  # else one of its kind
+        ("cumin__shaker.n.01", "shaker"),
         ("statue.n.09", None),  # furniture is too general to stand in
         ("nowhere.n.01", None),
     ],
@@ -138,6 +141,7 @@ def test_what_stands_in_for_synsets_of_behavior_1k(name, instead, monkeypatch):
         "carton__of__milk.n.01": (("grocery.n.02",), ("carton_of_milk",)),
         "bottle__of__vodka.n.01": (("grocery.n.02",), ("bottle_of_vodka",)),
         "half__apple.n.01": ((), ("half_apple",)),
+        **{f"{name}.n.01": ((), ()) for name in ("olive_oil__bottle", "acetone__bottle", "cumin__shaker")},
         "statue.n.09": (("furniture.n.01",), ("statue",)),
     }
     monkeypatch.setattr(behavior1k, "hierarchy", lambda: hierarchy)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 
-from ig2mj.knowledge import categories, categories_of, synset, taxonomy
+from ig2mj.knowledge import abilities, categories, categories_of, synset, taxonomy
 from ig2mj.tasks.bddl import behavior1k
 
 FLOOR = "floor.n.01"
@@ -25,8 +25,31 @@ STAND_INS = {
     "mail.n.04": "envelope.n.01",
     "packing_box.n.02": "carton.n.02",
     "sunglasses.n.02": "sunglass.n.01",
+    "canister.n.02": "jar.n.01",
+    "hinged_jar.n.01": "jar.n.01",
+    "mixing_bowl.n.01": "bowl.n.01",
+    "mop_bucket.n.01": "bucket.n.01",
+    "pot.n.04": "caldron.n.01",
+    "sponge.n.01": "rag.n.01",
+    "tupperware.n.01": "bowl.n.01",
+    "watering_can.n.01": "kettle.n.01",
 }
-"""Synsets of BEHAVIOR-1K that are the same thing under another name here, though their taxonomy does not say so."""
+"""Synsets of BEHAVIOR-1K that are the same thing under another name here, though their taxonomy does not say so, or a
+container or tool of the same use."""
+
+CONTAINERS = {
+    "bottle": ("vinegar", "detergent", "shampoo", "wine_bottle"),
+    "jar": ("jar",),
+    "shaker": ("salt", "pepper_grinder"),
+    "bag": ("paper_bag",),
+    "box": ("carton",),
+    "carton": ("milk", "carton"),
+    "can": ("pop",),
+}
+"""Kinds of container (`salt__shaker`, `liquid_soap__bottle`) and the categories that stand for one of any content."""
+
+OF_THEIR_OWN = ("salt", "flour")
+"""Categories of a content that are containers of it; those of liquids are, too."""
 ROOM_STAND_INS = {"private_office": "home_office", "shared_office": "home_office"}
 """Kinds of room of BEHAVIOR-1K that a home has under another name."""
 
@@ -54,6 +77,10 @@ def kinds(name: str, behavior_1k: bool = False) -> Kinds:
     above, own = behavior1k.hierarchy()[name]
     known = set(categories())
     stem = name.split(".")[0]
+    content, _, container_kind = stem.rpartition("__")
+    if container_kind in CONTAINERS and not content.endswith("__of"):
+        named = [content] if content in OF_THEIR_OWN or (content in known and "liquid" in abilities(content)) else []
+        return Kinds(tuple(dict.fromkeys([*named, *CONTAINERS[container_kind]])), (named or [container_kind])[0])
     for word in (*own, stem, *reversed(stem.split("__of__"))):
         if word in known and name not in STAND_INS:
             return Kinds((word,), word)
