@@ -104,12 +104,13 @@ def _candidates(world: Simulation) -> list[Atom]:
 
     from ig2mj.geometry.boxes import point_in_box
     from ig2mj.predicates import PREDICATES, atom
+    from ig2mj.predicates.registry import OF_SUBSTANCES
     from ig2mj.scene.manifest import BUILDING
 
     tables, view, names = world.scene.tables, world.view, world.scene.object_names
     asked = []
     for p in PREDICATES.values():
-        if p.arity == 1 and (p.ability or len(tables.agent_names)):
+        if p.arguments == ("object",) and (p.ability or (len(tables.agent_names) and p.name not in OF_SUBSTANCES)):
             having = world.state_model.parameters.has(p.ability) if p.ability else ~tables.object_parked
             asked += [atom(p.name, names[o]) for o in np.flatnonzero(having & (tables.object_part_of < 0))]
     touching = np.asarray(view.touching)[0]

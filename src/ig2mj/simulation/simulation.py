@@ -371,7 +371,7 @@ class Simulation(Recorded):
         kind, model, view = find_state(name), self.state_model, self.view
         if object_name is not None:
             index = object_index(model, object_name)
-            if not kind.belongs_to(model, index):
+            if not kind.belongs_to(model, index) and not kind.of_substances:  # whose `get` says what is missing
                 raise AbilityError(lacks(f"state '{kind.name}'", object_name, model, kind.abilities or ()))
             return kind.get(model, self.states, view, index, 0)
         names = self.scene.object_names

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ig2mj.predicates.compile import CompiledExpression
-from ig2mj.predicates.registry import PREDICATES
+from ig2mj.predicates.registry import OF_SUBSTANCES, PREDICATES
 from ig2mj.predicates.tree import Part, tree
 from ig2mj.states.definitions import from_physics
 from ig2mj.states.model import StateModel
@@ -43,7 +43,8 @@ def object_rows(model: StateModel, shot: Shot, index: int) -> list[tuple[str, st
     for predicate in PREDICATES.values():
         name, of_states = predicate.name.replace("_", " "), predicate.per_object
         able = predicate.ability is None or bool(model.parameters.has(predicate.ability)[index])
-        if of_states is None or name in named or not able:
+        of_substances = predicate.name in OF_SUBSTANCES and model.substances is None
+        if of_states is None or name in named or not able or of_substances:
             continue
         true = bool(np.asarray(of_states(model, shot.states))[shot.row, index])
         rows.insert(len(rows) - long, (name, _text(true)))

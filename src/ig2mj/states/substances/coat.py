@@ -255,6 +255,7 @@ SPEC = StateSpec(
     name="coat",
     get=_get,
     abilities=None,
+    of_substances=True,
     fields={"coat": UInt32[Array, "W D U"], "absorbed": Float[Array, "W D U"]},
     initial=_initial,
     update=wipe,

@@ -53,6 +53,7 @@ SPEC = StateSpec(
     name="solid",
     get=_get,
     abilities=None,
+    of_substances=True,
     fields={"solid": Bool[Array, "W C U"], "warm": Bool[Array, "W D Q"]},
     initial=_initial,
     update=_update,

@@ -220,6 +220,7 @@ SPEC = StateSpec(
     name="volume",
     get=_get,
     abilities=None,
+    of_substances=True,
     unit="l",
     fields={
         "volume": Float[Array, "W C U"],
