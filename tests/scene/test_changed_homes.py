@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import mujoco
 import numpy as np
@@ -156,3 +157,17 @@ def test_files_that_were_made_with_changes_give_them_back(table):
     assert list(found) == scene.requested
     assert requests_again(["remove:mug_0"], [], "a file") == ("remove:mug_0",)
     assert object_texts(["remove:mug_0", f"replace:bowl_0={table}"])[0] == "remove:mug_0"
+
+
+def test_a_folder_that_replaces_an_object_is_found_again_by_its_hash(table, tmp_path, monkeypatch):
+    was, now = tmp_path / "was" / "table", tmp_path / "now" / "table"
+    shutil.copytree(table, was)
+    scene = ig2mj.load_scene("small_home", objects=["mug"], replace={"breakfast_table_0": was})
+    assert [a.name for a in scene.replacements] == ["breakfast_table_0"]
+    entries = entries_of((*scene.replacements, *scene.additions))
+    now.parent.mkdir()
+    was.rename(now)
+    monkeypatch.setenv("IG2MJ_OBJECTS", str(now.parent))
+    found = requests_again(scene.requested, entries, "run.h5")
+    assert list(found) == [f"replace:breakfast_table_0={now}", *scene.requested[1:]]
+    assert ig2mj.load_scene("small_home", objects=found).digest == scene.digest

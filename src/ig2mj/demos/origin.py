@@ -113,6 +113,7 @@ def origin_of_scene(scene: Scene, version: int = FORMAT_VERSION) -> dict[str, An
         "objects": json.dumps(list(scene.object_names)),
         "additions": json.dumps(scene.requested),
         "additions_found_by": json.dumps(entries_of(scene.additions)),
+        **({"replacements_found_by": json.dumps(entries_of(scene.replacements))} if scene.replacements else {}),
     }
 
 

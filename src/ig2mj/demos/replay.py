@@ -286,7 +286,8 @@ def objects_again(recording: Recording, wanted: Any) -> tuple[str, ...]:
     if not isinstance(wanted, list) or not all(isinstance(text, str) for text in wanted):
         raise InputError(recording.file, "has objects that are no list of texts", element="attribute made_with")
     known = recording.value("additions_found_by", list)
-    return requests_again(wanted, known[len(known) - len(added(wanted)) :], recording.file)
+    replaced = recording.value("replacements_found_by", list) if "replacements_found_by" in recording.header else []
+    return requests_again(wanted, [*replaced, *known[len(known) - len(added(wanted)) :]], recording.file)
 
 
 def recorded_observations(recording: Recording) -> tuple[str, ...]:

@@ -70,7 +70,8 @@ def objects_on_card(env: Any) -> dict[str, Any]:
         return {}
     wanted = list(object_texts(config.objects))
     additions = env.scene.additions
-    return {"objects": wanted, "objects_found_by": entries_of(additions[len(additions) - len(added(wanted)) :])}
+    own = additions[len(additions) - len(added(wanted)) :]
+    return {"objects": wanted, "objects_found_by": entries_of((*env.scene.replacements, *own))}
 
 
 def objects_of(policy: Policy, file: object) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import msgspec
 
 from ig2mj.errors import InputError
 from ig2mj.scene.additions import Addition
-from ig2mj.scene.changes import added
+from ig2mj.scene.changes import added, read_change
 from ig2mj.scene.library import LibraryModel, folder_of, own_library, read_model
 
 
@@ -59,7 +59,8 @@ def requests_again(
     """Texts of `load_scene(objects=...)` in a file, with the folders where their models are now.
 
     Args:
-      wanted: the texts. entries: the additions that they gave, as of `entries_of`. file: see `find_again`.
+      wanted: the texts. entries: the additions that they gave, as of `entries_of`: what replaces objects of the home,
+        where the file has it, and what was added. file: see `find_again`.
 
     Raises:
       InputError: a model is missing, or the entries do not belong to the texts.
@@ -70,13 +71,26 @@ def requests_again(
     except msgspec.ValidationError as e:
         raise InputError(file, str(e), element="objects") from e
     texts = added(wanted)
+    instead = {change.name: change for text in wanted if (change := read_change(text)) is not None and change.instead}
+    replaced = {a.name: a for a in known[: len(known) - len(texts)] if a.name in instead}
+    known = known[len(replaced) :]
     if len(known) != len(texts):
         raise InputError(file, f"names {len(wanted)} objects and describes {len(known)}", element="objects")
-    found = [text for text in wanted if text not in texts]
+    found = [_replaced_again(text, replaced, file) for text in wanted if text not in texts]
     for text, was, now in zip(texts, known, find_again(known, file), strict=True):
         moved = was.folder is not None and now.folder is not None and text.startswith(was.folder)
         found.append(f"{now.folder}{text.removeprefix(str(was.folder))}" if moved else text)
     return tuple(found)
+
+
+def _replaced_again(text: str, replaced: Mapping[str, Addition], file: str | os.PathLike) -> str:
+    """A change of the home with the folder where the model is now. Raises InputError: it is missing."""
+    change = read_change(text)
+    was = None if change is None else replaced.get(change.name)
+    if change is None or was is None or was.folder is None:
+        return text
+    (now,) = find_again([dataclasses.replace(was, named=False)], file)  # its name is the old object's
+    return dataclasses.replace(change, instead=now.folder).text
 
 
 def _found(addition: Addition, file: str | os.PathLike) -> Addition:

@@ -39,11 +39,13 @@ Planned = Sequence[tuple[Addition, LibraryModel]]
 
 @dataclasses.dataclass(frozen=True)
 class MergedHome:
-    """root: MJCF with absolute paths. manifest: of it. removed: names of the home that are gone."""
+    """root: MJCF with absolute paths. manifest: of it. removed: names of the home that are gone. replacements: what
+    stands in the place of others, under their names."""
 
     root: ElementTree.Element
     manifest: Manifest
     removed: tuple[str, ...] = ()
+    replacements: tuple[Addition, ...] = ()
 
 
 def merged_home(file: pathlib.Path, manifest: Manifest, changes: Sequence[Change], planned: Planned) -> MergedHome:
@@ -74,7 +76,7 @@ def merged_home(file: pathlib.Path, manifest: Manifest, changes: Sequence[Change
         if not lost:
             break
         also |= lost
-    return MergedHome(root, merged, changed.removed)
+    return MergedHome(root, merged, changed.removed, tuple(addition for addition, _ in changed.planned))
 
 
 def _compiled(root: ElementTree.Element, file: pathlib.Path) -> mujoco.MjModel:

@@ -81,6 +81,7 @@ class Scene:
       changes: objects of the home that were removed or replaced. removed: names of all that went, with what stood on
         them.
       looks: one of `LOOKS`: what `ig2mj.looks` adds where the scene is shown. `model` and `digest` do not depend on it.
+      replacements: objects that took the place, and the names, of others.
     """
 
     folder: pathlib.Path
@@ -93,6 +94,7 @@ class Scene:
     changes: tuple[Change, ...] = ()
     removed: tuple[str, ...] = ()
     looks: str = "day"
+    replacements: tuple[Addition, ...] = ()
 
     @property
     def substances(self) -> tuple[str, ...]:
@@ -327,10 +329,11 @@ def _load(
     changes: list[Change],
 ) -> Scene:
     folder, additions, removed = file.parent, list[Addition](), tuple[str, ...]()
+    replacements: tuple[Addition, ...] = ()
     if requests or changes:
         planned = plan_additions(manifest, requests)
         merged = merged_home(file, manifest, changes, planned)
-        manifest, removed = merged.manifest, merged.removed
+        manifest, removed, replacements = merged.manifest, merged.removed, merged.replacements
         additions = [addition for addition, _ in planned]
         spec = _spec_from_text(ElementTree.tostring(merged.root, encoding="unicode"), file)
     else:
@@ -344,7 +347,8 @@ def _load(
     if manifest.rooms.file:
         rooms = load_rooms(inside(manifest.rooms.file, folder, folder / MANIFEST_FILE, "rooms.file"))
     tables = build_tables(model, manifest, rooms, folder / MANIFEST_FILE)
-    return Scene(folder, manifest, model, tables, rooms, tuple(agents), tuple(additions), tuple(changes), removed)
+    scene = Scene(folder, manifest, model, tables, rooms, tuple(agents), tuple(additions), tuple(changes), removed)
+    return dataclasses.replace(scene, replacements=replacements)
 
 
 def _attach_all(agents: Sequence[Agent], spec: mujoco.MjSpec, manifest: Manifest) -> list[AgentEntry]:
