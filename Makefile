@@ -11,7 +11,7 @@ INTEROP ?= .interop
 INTEROP_ENVS ?= $(notdir $(patsubst %/requirements.txt,%,$(wildcard tests/interop/*/requirements.txt)))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup web demo test test-slow test-gpu test-interop check docs homes-check pools demonstrations format bench clean distclean
+.PHONY: help setup web demo test test-slow test-gpu test-interop check docs homes-check pools demonstrations gallery format bench clean distclean
 
 help:
 	@echo "make demo       convert the small home, run it, cook a fish in it; leaves pictures, a plot, films, a report"
@@ -25,6 +25,7 @@ help:
 	@echo "make homes-check  build and convert all homes anew and compare them byte for byte with scenes_mjcf/"
 	@echo "make pools      sample the start states that ship anew (some minutes on many processors)"
 	@echo "make demonstrations  record the demonstrations that ship anew"
+	@echo "make gallery     render the images of docs/guide/gallery.md"
 	@echo "make format     let ruff put the code in order"
 	@echo "make bench      the benchmarks of the native engine; results in benchmarks/results/"
 	@echo "make setup      only the set-up: .venv and OpenGL libraries"
@@ -131,6 +132,9 @@ pools: setup
 # Needed when the humanoid, a home or the engine changes: recordings belong to the compiled model.
 demonstrations: setup
 	@$(BIN)/python scripts/record_demonstrations.py
+
+gallery: setup
+	@$(BIN)/python scripts/gallery.py
 
 format: setup
 	@$(BIN)/ruff check --fix

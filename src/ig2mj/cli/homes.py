@@ -346,6 +346,7 @@ def images(
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")],
     home: tuple[str, ...] = (),
     rooms: Flag = False,
+    looks: str = "day",
 ) -> None:
     """Render contact sheets of the homes: DIR/homes.jpg from above, and DIR/rooms_HOME.jpg of the rooms from inside.
 
@@ -353,11 +354,12 @@ def images(
       out: output folder.
       home: names or folders of homes; default: all that ship with ig2mj.
       rooms: also render the rooms, one sheet per home.
+      looks: "day", "night", or "plain" (without decoration).
     """
     from ig2mj.scene.scene import load_scene
     from ig2mj.viewer.home_sheet import from_above, rooms_inside
 
-    scenes = [load_scene(name) for name in home or [h["home"] for h in shipped_homes()]]
+    scenes = [load_scene(name, looks=looks) for name in home or [h["home"] for h in shipped_homes()]]
     scenes.sort(key=lambda scene: scene.tables.num_objects)
     out.mkdir(parents=True, exist_ok=True)
     sheets = {"homes.jpg": from_above(scenes)}

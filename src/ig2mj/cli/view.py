@@ -43,6 +43,7 @@ def run(
     robot_at: Annotated[Vec3, tyro.conf.arg(metavar="X Y DEGREES")] = (0.0, 0.0, 0.0),
     policy: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None,
     task: TaskOption = None,
+    looks: str = "day",
 ) -> None:
     """Open a scene in MuJoCo's viewer, or write an image of it.
 
@@ -71,6 +72,7 @@ def run(
       policy: instead of a scene: watch a trained policy, by the name of one that ships (`ig2mj policies list`) or the
         folder of a run.
       task: the policy's task, if it is defined in a file of yours; this imports the file.
+      looks: how a scene is shown: day, night, or plain (without decoration).
     """
     if policy is not None:
         from ig2mj.cli.view_policy import view_policy
@@ -100,7 +102,7 @@ def run(
     if row:
         raise Ig2mjError("--row needs --pool or --policy")
     if image is not None:
-        home = _with_robot(scene, object, robot, robot_at)
+        home = _with_robot(scene, object, robot, robot_at, looks)
         _write_image(home, image, camera, eye, target, size, seconds, collision)
         return
     import sys
@@ -113,7 +115,7 @@ def run(
     print(f"loading {scene}; the viewer opens when it is ready", file=sys.stderr, flush=True)
     from ig2mj.simulation import Simulation
 
-    world = Simulation(_with_robot(scene, object, robot, robot_at))
+    world = Simulation(_with_robot(scene, object, robot, robot_at, looks))
     if seconds > 0:
         world.step(count=round(seconds * 30))
     world.launch_viewer(paused=paused)
@@ -224,17 +226,17 @@ def _page_through(scene, pool, row, image, camera, eye, target, size, collision)
     print(f"wrote {image} (row {row} of {rows.size})", file=sys.stderr)
 
 
-def _with_robot(scene: pathlib.Path, objects: tuple[str, ...], robot: str | None, at: Vec3) -> Scene:
+def _with_robot(scene: pathlib.Path, objects: tuple[str, ...], robot: str | None, at: Vec3, looks: str) -> Scene:
     """The scene with objects, and with a robot if one is given."""
     import math
 
     from ig2mj.cli.common.objects import load_home
 
     if robot is None:
-        return load_home(scene, objects)
+        return load_home(scene, objects, looks=looks)
     from ig2mj.agents.registry import make_robot
 
-    return load_home(scene, objects, [make_robot(robot).at(at[0], at[1], math.radians(at[2]))])
+    return load_home(scene, objects, [make_robot(robot).at(at[0], at[1], math.radians(at[2]))], looks)
 
 
 def _write_image(home, file, camera, eye, target, size, seconds, collision) -> None:

@@ -37,6 +37,7 @@ def run(
     object: AddedObjects = (),
     task: TaskOption = None,
     paused: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    looks: str = "day",
 ) -> None:
     """Show a scene, an environment or a recording in the browser.
 
@@ -63,6 +64,7 @@ def run(
       object: {object}.
       task: for a recording: its task, if it is defined in a file of yours; this imports the file.
       paused: start paused.
+      looks: how the home is shown: day, night, or plain (without decoration).
     """
     import sys
 
@@ -71,8 +73,10 @@ def run(
     require_extras("web")
     from ig2mj.engine.registry import ENGINES
     from ig2mj.predicates.parse import parse
+    from ig2mj.scene.scene import check_looks
     from ig2mj.web.access import access_for
 
+    check_looks(looks)
     access = access_for(host, port, token, certificate, key)
     if worlds < 1:
         raise Ig2mjError(f"--worlds {worlds}: at least one is needed")
@@ -87,7 +91,9 @@ def run(
 
     use_task(task)
     source = _source(what, goal, set, pool, worlds, engine, agent, robot, seed, object)
-    with WebViewer(source, access, playing=not paused, title=f"ig2mj: {pathlib.Path(what).name}") as viewer:
+    with WebViewer(
+        source, access, playing=not paused, title=f"ig2mj: {pathlib.Path(what).name}", looks=looks
+    ) as viewer:
         print(viewer.url, flush=True)
         viewer.wait()
 

@@ -15,7 +15,7 @@ from ig2mj.viewer.offscreen import FreeView
 EYE_HEIGHT, FIELD_OF_VIEW, TILT = 1.55, 70.0, -13.0
 """m above the floor; degrees, vertical; degrees below the horizon."""
 
-FROM_WALLS, ABOVE = 0.3, 0.55
+FROM_WALLS, ABOVE = 0.42, 0.55
 """m that the eye keeps from walls and furniture; what is lower than `ABOVE` the floor does not block the view."""
 
 FROM_DOORS = 0.75

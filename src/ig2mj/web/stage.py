@@ -53,14 +53,17 @@ class Stage:
     Attributes: sent: poses that were sent so far, and geometries.
     """
 
-    def __init__(self, server: viser.ViserServer, scene: Scene, on_click: Click, on_drag: Pull | None):
+    def __init__(
+        self, server: viser.ViserServer, scene: Scene, on_click: Click, on_drag: Pull | None, looks: str | None = None
+    ):
         """Sends the home as it starts.
 
         Args:
           on_click: called with the object that is clicked. on_drag: called with viser's event, a body, and the event's
             node, while a movable body is dragged; None: nothing can be dragged.
+          looks: how the home is shown; None: the scene's own.
         """
-        self._server, self._scene, self._visual = server, scene, visual_of(scene)
+        self._server, self._scene, self._visual = server, scene, visual_of(scene, looks)
         self._model = self._visual.model
         self._on_click, self._on_drag = on_click, on_drag
         start = scene.start_data()

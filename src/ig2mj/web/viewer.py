@@ -34,8 +34,13 @@ TABLES_PER_SECOND = 4.0
 class WebViewer:
     """A source in the browser. Attributes: runner, stage, controls, gate: its parts. frames: frames sent so far."""
 
-    def __init__(self, source: Source, access: Access, *, playing: bool = True, title: str = ""):
+    def __init__(
+        self, source: Source, access: Access, *, playing: bool = True, title: str = "", looks: str | None = None
+    ):
         """Opens the port and sends the home; nothing moves before `start`.
+
+        Args:
+          looks: how the home is shown: one of `ig2mj.scene.scene.LOOKS`; None: the scene's own.
 
         Raises:
           Ig2mjError: the port is taken.
@@ -43,7 +48,7 @@ class WebViewer:
         self.runner = Runner(source, playing)
         self._server, self.gate = start_viser(access, title or source.scene.name)
         movable = self._drag if source.mujoco(0) is not None else None
-        self.stage = Stage(self._server, source.scene, self._click, movable)
+        self.stage = Stage(self._server, source.scene, self._click, movable, looks)
         self.controls = Controls(self._server, self.runner, title or source.scene.name)
         self.frames = 0
         self._last: Shot | None = None

@@ -57,11 +57,13 @@ def with_changes(function: Callable[..., Any], args: Sequence[str]) -> list[str]
     return out
 
 
-def load_home(scene: str | os.PathLike, objects: Sequence[str] = (), agents: Sequence[Agent] = ()) -> Scene:
+def load_home(
+    scene: str | os.PathLike, objects: Sequence[str] = (), agents: Sequence[Agent] = (), looks: str = "day"
+) -> Scene:
     """`load_scene`, with the notes of `note_changes`. Raises as `load_scene`."""
     from ig2mj.scene.scene import load_scene
 
-    loaded = load_scene(scene, agents, objects)
+    loaded = load_scene(scene, agents, objects, looks=looks)
     note_changes(loaded, objects)
     return loaded
 
