@@ -9,9 +9,12 @@ from pouring_scene import write_pouring_scene
 
 import ig2mj
 from ig2mj.errors import StateError, UnknownNameError
+from ig2mj.sampling.many import sample
 from ig2mj.simulation import Simulation
 from ig2mj.states import initial_states
 from ig2mj.states.model import StateModel
+from ig2mj.worlds import load_pool, save_pool
+from ig2mj.worlds.pool import load_pool_scene
 
 
 @pytest.fixture(scope="module")
@@ -86,3 +89,14 @@ def test_engines_agree(scene):
         (one, _), (other, _) = native.step(one), batched.step(other)
     assert float(one.world.states.volume[0, 1, 0]) > 0.5
     np.testing.assert_allclose(one.world.states.volume, other.world.states.volume, atol=1e-3)
+
+
+@pytest.mark.slow
+def test_sampled_rows_and_their_pools_have_substances(scene, tmp_path):
+    wanted = ["(filled glass water)", "(covered floor water)"]
+    done = sample(scene, wanted, 2, seed=1)
+    assert done.pool is not None and done.complete
+    save_pool(done.pool, tmp_path / "pool.npz", scene)
+    again = load_pool(tmp_path / "pool.npz", load_pool_scene(tmp_path / "pool.npz", scene.folder))
+    assert (np.asarray(again.states.volume)[:, 1, 0] > 0.2 * 0.64).all()
+    assert again.states.coat.any()

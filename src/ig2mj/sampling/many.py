@@ -32,8 +32,8 @@ from ig2mj.sampling.scene_refs import check_of, lent, named, scene_named
 from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import states_of_manifest
 from ig2mj.states.model import StateModel
-from ig2mj.worlds.archive import build, pack, unpack
-from ig2mj.worlds.pool import Pool, stack
+from ig2mj.worlds.archive import pack, unpack
+from ig2mj.worlds.pool import Pool, pool_of_arrays, stack, states_like
 
 ROW_BUDGET = 600
 """Units of work (see `Budget`) of one attempt at a row."""
@@ -128,6 +128,7 @@ def sampled_rows(
     if failed and journal is None:
         raise EngineError(next(iter(failed.values())))
     numbers, pools, rejected = [], [], collections.Counter()
+    like = states_like(scene)
     for number, job in enumerate(work.jobs, first):
         if job.name in failed:
             continue
@@ -135,7 +136,7 @@ def sampled_rows(
         rejected.update(header["rejected"])
         if arrays:
             numbers.append(number)
-            pools.append(build(Pool, arrays, job.name))
+            pools.append(pool_of_arrays(arrays, like, job.name))
     return Sampled(
         pool=dataclasses.replace(stack(pools), digest=scene.digest) if pools else None,
         rows=tuple(numbers),

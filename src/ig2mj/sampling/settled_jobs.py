@@ -21,8 +21,9 @@ from ig2mj.sampling.scene_refs import check_of, lent, named, scene_named
 from ig2mj.sampling.settled import Disturber, most_turns, too_few, width_of
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
-from ig2mj.worlds.archive import build, pack, unpack
-from ig2mj.worlds.pool import Pool, stack
+from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.archive import pack, unpack
+from ig2mj.worlds.pool import Pool, pool_of_arrays, stack, states_like
 
 
 def sample_settled(
@@ -52,6 +53,7 @@ def sample_settled(
     jobs: list[Job] = []
     pools: list[Pool] = []
     made = 0
+    like = states_like(scene)
     try:
         while made < count and len(jobs) < most_turns(count):
             yielded = made / len(jobs) if jobs else width  # rows a turn
@@ -66,7 +68,7 @@ def sample_settled(
                 raise EngineError(next(iter(failed.values())))
             if failed:
                 return None, failed
-            pools = [pool for job in jobs for pool in _unpacked(store.get(job.name), job.name)]
+            pools = [pool for job in jobs for pool in _unpacked(store.get(job.name), job.name, like)]
             made = sum(pool.size for pool in pools)
     finally:
         _disturber.cache_clear()
@@ -84,9 +86,9 @@ def turn_job(scene: str, objects: Sequence[str], seed: int, share: float, width:
     return pack(stack(rows) if rows else {}, {})
 
 
-def _unpacked(packed: bytes, name: str) -> list[Pool]:
+def _unpacked(packed: bytes, name: str, like: ExtendedStates | None) -> list[Pool]:
     arrays, _ = unpack(packed)
-    return [build(Pool, arrays, name)] if arrays else []
+    return [pool_of_arrays(arrays, like, name)] if arrays else []
 
 
 @functools.lru_cache(maxsize=1)

@@ -73,6 +73,19 @@ def stack(pools: list[Pool]) -> Pool:
     return jax.tree.map(lambda *rows: np.concatenate([np.asarray(r) for r in rows]), *pools)
 
 
+def states_like(scene: Scene) -> ExtendedStates | None:
+    """States of one world of a scene, of the kind that its rows have; None: those that every scene has."""
+    if not scene.substances:
+        return None
+    return initial_states(StateModel.of_manifest(scene.tables, scene.manifest), 1)
+
+
+def pool_of_arrays(arrays: Mapping[str, np.ndarray], like: ExtendedStates | None, name: str) -> Pool:
+    """The pool of packed arrays. `like`: see `states_like`. Raises InputError: an array is missing."""
+    pool = build(Pool, arrays, name)
+    return pool if like is None else dataclasses.replace(pool, states=build(type(like), arrays, name, "states."))
+
+
 def save_pool(pool: Pool, file: str | os.PathLike, scene: Scene, note: dict[str, Any] | None = None) -> None:
     """Writes a pool of the scene, with the objects that were added to it. `note`: how it was made, for people."""
     header = {
