@@ -145,8 +145,10 @@ class Solving:
         episode.since = time.monotonic()
         facts = rung.facts(world)
         ended = ""
+        last = episode.records[-1] if episode.records else None
+        begun = last.step.serves if last is not None and last.outcome.done else None
         try:
-            plan = planner.plan(facts, episode.failed)
+            plan = planner.plan(facts, episode.failed, begun)
         except PlanningError as e:
             if episode.plan is None:
                 raise

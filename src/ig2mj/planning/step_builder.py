@@ -27,16 +27,21 @@ class StepBuilder:
         wanted: Sequence[Condition],
         missing: Sequence[Condition],
         failed: Mapping[Condition, int],
+        begun: Condition | None = None,
     ):
+        """
+        Args:
+          wanted, missing, failed: see `TaskPlan`, `TaskPlanner.plan`. begun: condition that the last step was for.
+        """
         self._facts, self._domain, self._failed = facts, facts.domain, failed
-        self._wanted = wanted
+        self._wanted, self._begun = wanted, begun
         self.steps: list[Step] = []
         self._held = list(facts.held)
         self._open: dict[str, bool] = {}
         self._on: dict[str, bool] = {}
         self._wet: set[str] = set()
         self._inside: dict[str, tuple[str, ...]] = {}
-        for condition in ordered(missing, failed, self._held, self._tool, self._domain):
+        for condition in ordered(missing, failed, self._held, self._tool, self._domain, begun):
             self._serves = condition
             self._make(condition)
         for condition in wanted:  # what the steps themselves made false
@@ -211,8 +216,13 @@ class StepBuilder:
     def _move(self, c: Condition) -> None:
         """Makes a placement true, or false. Conditions on the same object are made true together."""
         mover = self._domain.mover(c)
-        if c.value and c.predicate in SYMMETRIC and self._failed.get(c, 0) % 2:  # after a failure, the other object
-            mover = next((a for a in c.arguments if a != mover and not self._domain.fixed(a)), mover)
+        if c.value and c.predicate in SYMMETRIC and (count := self._failed.get(c, 0)):
+            other = next((a for a in c.arguments if a != mover and not self._domain.fixed(a)), "")
+            if other and count >= LATER and self._placed_otherwise(other, c):
+                if c != self._begun or other in self._held:
+                    self._elsewhere(other, c)
+            elif other and count % 2:
+                mover = other
         for name in self._parts(mover, c):
             if not c.value:
                 if not self._moved(name):
@@ -242,11 +252,24 @@ class StepBuilder:
                 self._put(PLACE[crowding.predicate], crowding.arguments[0], target)
                 self._serves = c
 
+    def _placed_otherwise(self, name: str, c: Condition) -> list[Condition]:
+        """Conditions of the reading on where an object is, but for one."""
+        return [w for w in self._wanted if w.value and w.predicate in PLACE and w.arguments[0] == name and w != c]
+
+    def _elsewhere(self, name: str, c: Condition) -> None:
+        """Places the partner of a relation in another spot where all else holds of it: there may be no room next to
+        the present one."""
+        own = sorted(self._placed_otherwise(name, c), key=lambda w: list(PLACE).index(w.predicate))
+        target = own[0].arguments[1]
+        self._reach(target)
+        self._take(name)
+        self._put(PLACE[own[0].predicate], name, target, tuple(own[1:]))
+
     def _crowding(self, rule: Condition, c: Condition) -> Condition | None:
         """After failures of a placement, one of the things that are there already: it is taken out first and put back
         last, so that the room is divided in another way. Needs two hands."""
         count = self._failed.get(c, 0)
-        if count < LATER or self._domain.hands < 2 or rule.predicate not in ("inside", "on_top"):
+        if c == self._begun or count < LATER or self._domain.hands < 2 or rule.predicate not in ("inside", "on_top"):
             return None
         there = [
             w

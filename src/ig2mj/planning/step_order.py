@@ -29,12 +29,14 @@ def ordered(
     held: Collection[str],
     tool: Callable[[Condition], str],
     domain: Domain,
+    begun: Condition | None = None,
 ) -> list[Condition]:
     """Conditions in the order in which they are made true, without those that failed `GIVE_UP` times.
 
     Args:
       missing: conditions that are false. failed: how often steps of a condition failed. held: what hands hold.
-      tool: what cleans or cuts for a condition.
+      tool: what cleans or cuts for a condition. begun: condition that the last step was for; it is gone on with if it
+        has failed before, since its steps change what others need.
     """
     targets = list(dict.fromkeys(c.arguments[-1] for c in missing))
     first = sorted((c for c in missing if c.predicate in FIRST), key=lambda c: FIRST.index(c.predicate))
@@ -51,7 +53,7 @@ def ordered(
     tools = [c for c in order if c.predicate in ("dusty", "stained", "sliced") and tool(c) in held]
     order = list(dict.fromkeys([*tools, *in_hand, *order]))
     tried = [c for c in order if failed.get(c, 0) < GIVE_UP]
-    return sorted(tried, key=lambda c: failed.get(c, 0) >= LATER)
+    return sorted(tried, key=lambda c: (c != begun or not failed.get(c, 0), failed.get(c, 0) >= LATER))
 
 
 def supports_first(places: Sequence[Condition]) -> list[Condition]:

@@ -75,11 +75,14 @@ class TaskPlanner:
         self.domain, self.goal = domain, goal
         self._impossible: dict[Condition, str] = {}
 
-    def plan(self, facts: Facts, failed: Mapping[Condition, int] | None = None) -> TaskPlan:
+    def plan(
+        self, facts: Facts, failed: Mapping[Condition, int] | None = None, begun: Condition | None = None
+    ) -> TaskPlan:
         """The steps that are left.
 
         Args:
           failed: how often the steps of a condition have failed.
+          begun: condition that the last step was for, if that step succeeded.
 
         Raises:
           PlanningError: the goal cannot become true; names the literal and the reason.
@@ -102,7 +105,7 @@ class TaskPlanner:
             raise PlanningError(f"the goal cannot become true: {self._why_not(truth, cost, together)}")
         wanted = tuple(condition_of(atom, wanted) for atom, wanted in reading.items())
         missing = tuple(condition_of(atom, wanted) for atom, wanted in reading.items() if truth[atom] != wanted)
-        return TaskPlan(tuple(StepBuilder(facts, wanted, missing, failed).steps), missing, wanted)
+        return TaskPlan(tuple(StepBuilder(facts, wanted, missing, failed, begun).steps), missing, wanted)
 
     def _reason(self, condition: Condition) -> str:
         if condition not in self._impossible:

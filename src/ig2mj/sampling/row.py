@@ -43,7 +43,7 @@ SHARE = 3
 """An object may spend 1/SHARE of the remaining budget of the row before the sampler backtracks to the one before it."""
 
 OPENINGS = 12
-"""Positions sampled for an object's joints until it stays at rest: a half-open lid may fall shut."""
+"""Positions sampled for an object's joints until it stays at rest."""
 
 KEPT_TRUTHS = 256
 """Lists of conditions whose evaluation is kept."""
@@ -225,13 +225,20 @@ class RowSampler:
         return False
 
     def _open(self, condition: Condition, rng: np.random.Generator, rejected: Rejections) -> bool:
-        """Moves an object's joints so that a condition about `open` holds when everything has come to rest."""
+        """Moves an object's joints so that a condition about `open` holds when everything has come to rest.
+
+        What is to stand open is tried wider each time: a lid that stands half open may fall shut.
+        """
         name = condition.arguments[0]
         mover = JointMover(self.query, object_index(self.model, name))
-        for _ in range(OPENINGS):
+        for tries in range(OPENINGS):
             change = self._change(condition, rng)
             assert change.joints is not None
-            problem = mover.problem(mover.plan(*change.joints))
+            positions, moves = change.joints
+            if condition.value:
+                wider = tries / (OPENINGS - 1)
+                positions = positions + wider * (self.model.tables.openable_open - positions)
+            problem = mover.problem(mover.plan(positions, moves))
             if not problem and self._holds((condition,)):
                 return True
             rejected[f"{name}: {problem or 'joints do not rest'}"] += 1
