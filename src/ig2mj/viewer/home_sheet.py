@@ -27,7 +27,7 @@ def from_above(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
     tiles = []
     for scene in scenes:
         data = scene.start_data()
-        view = home_overview(scene, data, elevation=-68.0)
+        view = home_overview(scene, data)
         view = dataclasses.replace(view, distance=FURTHER * view.distance)
         objects = sum(not entry.parked for entry in scene.manifest.objects) - 3  # walls, floors, ceilings
         text = f"{scene.name}: {len(scene.manifest.rooms.instances)} rooms, {objects} objects"
@@ -59,7 +59,8 @@ def _tile(scene: Scene, data: mujoco.MjData, view, text: str) -> Image.Image:
 
 def _sheet(tiles: list[Image.Image], columns: int) -> Image.Image:
     width, height = TILE
-    rows = math.ceil(len(tiles) / columns)
+    rows = max(math.ceil(len(tiles) / columns), 1)
+    columns = max(math.ceil(len(tiles) / rows), 1)  # as few empty places as these rows allow
     sheet = Image.fromarray(np.full((rows * height, columns * width, 3), 255, np.uint8))
     for k, tile in enumerate(tiles):
         sheet.paste(tile, (k % columns * width, k // columns * height))

@@ -12,8 +12,11 @@ from ig2mj.viewer.offscreen import FreeView
 #: degrees is 2.6; a home is flat and wider than high, and fills a wide image from nearer.
 DISTANCE_IN_RADII = 1.8
 
+ELEVATION = -68.0
+"""Degrees: steep enough that a wall of 2.5 m hides one metre of the floor behind it."""
 
-def home_overview(scene: Scene, data: mujoco.MjData, azimuth: float = 90.0, elevation: float = -50.0) -> FreeView:
+
+def home_overview(scene: Scene, data: mujoco.MjData, azimuth: float = 90.0, elevation: float = ELEVATION) -> FreeView:
     """A view that holds all collision geoms of objects in use; of the whole model where there are none.
 
     Args:
