@@ -6,11 +6,13 @@ import mujoco
 import numpy as np
 import pytest
 
+from ig2mj.envs.config import EnvConfig
 from ig2mj.errors import UnknownNameError
 from ig2mj.looks import visual_of
 from ig2mj.looks.home_plan import read_plan, spans
 from ig2mj.looks.light import DAY, NIGHT, linear_lights, shade
 from ig2mj.scene.scene import load_scene
+from ig2mj.sensors.base import CAMERA_LOOKS, SensorOptions
 
 
 @pytest.fixture(scope="module")
@@ -118,3 +120,11 @@ def test_lights_of_linear_renderers_come_near_to_ours():
 def test_unknown_looks_are_refused(home):
     with pytest.raises(UnknownNameError, match=r"looks.*'dayy'"):
         load_scene("small_home", looks="dayy")
+
+
+def test_robots_cameras_see_the_plain_home_unless_asked():
+    """Policies that ship were trained on it."""
+    assert SensorOptions().looks == CAMERA_LOOKS == "plain" == EnvConfig().sensor_options().looks
+    assert EnvConfig(looks="night").sensor_options().looks == "night"
+    with pytest.raises(UnknownNameError, match="'dayy'"):
+        EnvConfig(looks="dayy").sensor_options()

@@ -371,10 +371,10 @@ def images(
 
 
 def tour(
-    home: Annotated[str, tyro.conf.Positional],
+    home: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="HOME")],
     video: Annotated[pathlib.Path, tyro.conf.arg(metavar="FILE")],
     looks: str = "day",
-    size: tuple[int, int] = (1280, 720),
+    size: Annotated[tuple[int, int], tyro.conf.arg(metavar="W H")] = (1280, 720),
 ) -> None:
     """Write a video of a walk through a home: from above, then room after room through open doors.
 

@@ -82,7 +82,7 @@ class Mouse:
             data.xfrc_applied[self._held], self._held = 0.0, 0
         body, dragging = int(perturb.select), bool(perturb.active)
         self._lost &= dragging
-        if body <= 0:
+        if not 0 < body < model.nbody:  # decoration is behind the scene's own bodies
             self._pushes = 0
             return
         point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ perturb.localpos
