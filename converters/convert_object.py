@@ -155,8 +155,8 @@ def _scale(source: ObjectModel, bounding_box: tuple[float, float, float] | None)
     """Scale [3] that gives the object the size wanted. Raises InputError."""
     if bounding_box is None:
         return np.ones(3)
-    wanted = np.asarray(bounding_box, dtype=float)
-    if not np.all(np.isfinite(wanted)) or np.any(wanted <= 0):
+    requested = np.asarray(bounding_box, dtype=float)
+    if not np.all(np.isfinite(requested)) or np.any(requested <= 0):
         raise InputError(
             source.file, f"cannot have the size {bounding_box}", element="--bbox", fix="give positive metres"
         )
@@ -166,7 +166,7 @@ def _scale(source: ObjectModel, bounding_box: tuple[float, float, float] | None)
         size = np.zeros(3) if box is None else box[1] - box[0]
     if np.any(np.asarray(size) <= 0):
         raise InputError(source.file, "is flat: it cannot be scaled to a bounding box", element="--bbox")
-    return wanted / size
+    return requested / size
 
 
 def _halves(dataset: Dataset | None, whole: BuiltModel, options: ConvertOptions) -> dict[str, BuiltModel]:

@@ -228,8 +228,8 @@ def test_no_module_imports_itself_by_way_of_others():
     graph = networkx.DiGraph()
     names = modules()
     for name, file in names.items():
-        for _, wanted in imports_of(file):
-            found = wanted if wanted in names else wanted.rpartition(".")[0]
+        for _, expected in imports_of(file):
+            found = expected if expected in names else expected.rpartition(".")[0]
             if found in names and found != name:
                 graph.add_edge(name, found)
     assert graph.number_of_edges() > 500
@@ -307,8 +307,8 @@ def test_every_data_file_is_packed():
         for file in folder.iterdir():
             if file.is_file() and file.suffix not in (".py", ".pyc", ".pyi"):
                 relative = file.relative_to(top).as_posix()
-                wanted = [p for p in patterns.get(root, []) if fnmatch.fnmatch(relative, p.removeprefix("**/"))]
-                if not wanted:
+                expected = [p for p in patterns.get(root, []) if fnmatch.fnmatch(relative, p.removeprefix("**/"))]
+                if not expected:
                     left_out.append(file.relative_to(ROOT).as_posix())
     assert not left_out
 

@@ -64,10 +64,10 @@ def write_dataset(root: pathlib.Path, sizes: tuple[int, ...] = SIZES) -> Dataset
     """Writes the objects, if they are not there yet, and one scene per size. The same bytes every time."""
     note = root / ".objects_written"
     there = set(note.read_text().split()) if note.exists() else set()
-    wanted = set(TABLE_A7 if set(sizes) <= {20} else (*TABLE_A7, *FURNITURE, *STANDING, *THINGS))
-    if not wanted <= there:
-        build_dataset(root, only=sorted(wanted | there), jobs=1)
-        note.write_text("\n".join(sorted(wanted | there)))
+    expected = set(TABLE_A7 if set(sizes) <= {20} else (*TABLE_A7, *FURNITURE, *STANDING, *THINGS))
+    if not expected <= there:
+        build_dataset(root, only=sorted(expected | there), jobs=1)
+        note.write_text("\n".join(sorted(expected | there)))
     dataset = Dataset(root)
     for size in sizes:
         _write_scene(dataset, scene_name(size), _table_a7(dataset) if size == 20 else _one_room(dataset, size))

@@ -82,8 +82,8 @@ def collect(env: Environment, perception: Perception, count: int, pace: float, n
         steps: list[tuple[np.ndarray, Seen, np.ndarray]] = []
         won = np.zeros(env.num_worlds, bool)
         while going.any():
-            wanted = np.asarray(expert(state)) * np.where(closing, 1.0, pace)
-            action = wanted + np.where(closing, 0.0, noise * pace) * rng.standard_normal(wanted.shape)
+            expected = np.asarray(expert(state)) * np.where(closing, 1.0, pace)
+            action = expected + np.where(closing, 0.0, noise * pace) * rng.standard_normal(expected.shape)
             action = np.clip(action, -1, 1).astype(np.float32)
             seen = perception(state.obs)
             steps.append((action, Seen(np.asarray(seen.vector), np.asarray(seen.image)), going.copy()))

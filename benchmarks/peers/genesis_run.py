@@ -184,8 +184,8 @@ class Batch:
 
 def _contacts(written: Row, worlds: int) -> int:
     """A home's contacts at rest and a fifth, within what one tensor holds at four rows a contact."""
-    wanted = 1.2 * written["contacts_at_rest"] + 60
-    return int(min(wanted, 2**31 / (4.2 * written["dofs"] * worlds)))
+    expected = 1.2 * written["contacts_at_rest"] + 60
+    return int(min(expected, 2**31 / (4.2 * written["dofs"] * worlds)))
 
 
 def run(args: argparse.Namespace, row: Row, keep: Callable[[], None]) -> None:

@@ -55,11 +55,11 @@ def main() -> None:
 
 def sample(problem: Problem, split: str, count: int) -> None:
     """Samples start states, and reports how many there are each time that some more are kept."""
-    for wanted in [*range(SAMPLED_TOGETHER, count, SAMPLED_TOGETHER), count]:
-        pool = problem.pool(split, wanted)
+    for expected in [*range(SAMPLED_TOGETHER, count, SAMPLED_TOGETHER), count]:
+        pool = problem.pool(split, expected)
         size = count if pool is None else pool.size
         report(event="pool", size=min(size, count), home=problem.scene.name)
-        if size < wanted:
+        if size < expected:
             return
 
 

@@ -115,16 +115,16 @@ def sample_seeds(binding: Binding, seeds: int, row: dict[str, Any], seconds: flo
     began = time.monotonic()
     scene = load_bound(binding)
     sampler = make_sampler(scene)
-    wanted = start_conditions(binding, scene)
+    expected = start_conditions(binding, scene)
     check = GoalCheck(binding, sampler.query, sampler.model)
-    sampler.sample(wanted, np.random.default_rng(0), Budget(1), collections.Counter())  # compiles
+    sampler.sample(expected, np.random.default_rng(0), Budget(1), collections.Counter())  # compiles
     preparing = time.monotonic() - began
     done, reasons = list(row["seeds"]), collections.Counter(row["reasons"])
     for seed in range(len(done), seeds):
         if len(done) >= HOPELESS and not any(one["done"] for one in done):
             break
         wall, processor = time.monotonic(), time.process_time()
-        made, why = sample_row(sampler, wanted, seed, 0, seconds)
+        made, why = sample_row(sampler, expected, seed, 0, seconds)
         done.append(
             {
                 "done": made is not None,
@@ -136,7 +136,7 @@ def sample_seeds(binding: Binding, seeds: int, row: dict[str, Any], seconds: flo
         reasons.update(why)
     return {
         "preparing": round(preparing, 2),
-        "conditions": len(wanted),
+        "conditions": len(expected),
         "seeds": done,
         "reasons": dict(reasons.most_common()),
     }

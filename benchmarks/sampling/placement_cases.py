@@ -110,10 +110,10 @@ def main(args: Args) -> None:
     for name, home in ACTIVITIES:
         binding = bind(load_activity(name), load_manifest(scene_folder(home)))
         scene = load_bound(binding)
-        wanted, sampler = start_conditions(binding, scene), make_sampler(scene)
+        expected, sampler = start_conditions(binding, scene), make_sampler(scene)
         count = max(args.speed // 10, 2)
-        made, rate = per_second(sampler, wanted, count)
-        what = f"{name} in {home}, {len(wanted)} conditions"
+        made, rate = per_second(sampler, expected, count)
+        what = f"{name} in {home}, {len(expected)} conditions"
         speeds.append({"what": what, "rows": made, "of": count, "per_second": rate})
     lines = [(s["what"], f"{s['rows']} of {s['of']}", f"{s['per_second']:.1f}") for s in speeds]
     tables.append(table("Settled states per second, one core", ("what", "made", "per second"), lines))

@@ -213,8 +213,8 @@ def points_in(hull: Hull, count: int = SAMPLES) -> np.ndarray:
     """About `count` points [., 3] spread evenly inside the hull, always the same ones."""
     low, high = hull.vertices.min(axis=0), hull.vertices.max(axis=0)
     share = hull.volume / max(float(np.prod(high - low)), 1e-300)
-    wanted = int(min(count / max(share, 1e-3), 64 * count))
-    points = low + scipy.stats.qmc.Halton(3, scramble=False).random(wanted) * (high - low)
+    requested = int(min(count / max(share, 1e-3), 64 * count))
+    points = low + scipy.stats.qmc.Halton(3, scramble=False).random(requested) * (high - low)
     inside = points[hull.contains(points)]
     return inside if len(inside) else hull.vertices.mean(axis=0, keepdims=True)
 

@@ -100,8 +100,8 @@ def _prepare(root: Element, looks: ColladaLooks | None) -> dict[str, dict[str, s
             if child.tag not in keep:
                 holder.remove(child)
     scenes = root.findall("library_visual_scenes/visual_scene")
-    wanted = root.find("scene/instance_visual_scene")
-    named = "" if wanted is None else (wanted.get("url") or "").removeprefix("#")
+    requested = root.find("scene/instance_visual_scene")
+    named = "" if requested is None else (requested.get("url") or "").removeprefix("#")
     if scenes and named not in {scene.get("id") for scene in scenes}:
         scenes[0].set("id", _FALLBACK)
         for scene in root.findall("scene"):

@@ -81,9 +81,9 @@ class ColladaLooks:
         element = holder.find("color")
         reference = holder.find("param")
         if element is None and reference is not None:
-            wanted = reference.get("ref") or ""
+            requested = reference.get("ref") or ""
             for parameter in effect.iter("newparam"):
-                if parameter.get("sid") == wanted:
+                if parameter.get("sid") == requested:
                     element = next((parameter.find(kind) for kind in ("float4", "float3") if
                                     parameter.find(kind) is not None), None)  # fmt: skip
         if element is None:

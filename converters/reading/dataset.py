@@ -240,10 +240,10 @@ def _check_metadata(model: ObjectModel) -> None:
 
 def _filter(scene: SceneDescription, options: SceneOptions) -> None:
     """Applies the loader's filters. An object without `room` is taken to be in the room it stands in."""
-    wanted = None if options.only_rooms is None else set(options.only_rooms)
-    if wanted is not None:
+    requested = None if options.only_rooms is None else set(options.only_rooms)
+    if requested is not None:
         known = {room for i in scene.instances for room in i.rooms} | set(scene.rooms.names if scene.rooms else [])
-        for word in sorted(wanted):
+        for word in sorted(requested):
             if word not in known and word not in map(_room_type, known):
                 raise UnknownNameError("room", word, sorted(known | set(map(_room_type, known))))
     kept = []
@@ -253,9 +253,9 @@ def _filter(scene: SceneDescription, options: SceneOptions) -> None:
         if instance.kind == "object":
             if options.only_categories is not None and instance.category not in options.only_categories:
                 continue
-            if wanted is not None:
+            if requested is not None:
                 rooms = instance.rooms or _standing_in(scene, instance)
-                if not any(room in wanted or _room_type(room) in wanted for room in rooms):
+                if not any(room in requested or _room_type(room) in requested for room in rooms):
                     continue
         kept.append(instance)
     _drop_orphans(scene, kept)

@@ -52,9 +52,9 @@ def preferred_models(models: list[tuple[str, str, pathlib.Path]]) -> dict[str, s
         by_category.setdefault(category, {})[int(model.rpartition("_")[2])] = model
     found = {}
     for category, numbered in by_category.items():
-        wanted = MODELS.get(category, (0,))[0]
-        if wanted in numbered and wanted != min(numbered):
-            found[category] = numbered[wanted]
+        requested = MODELS.get(category, (0,))[0]
+        if requested in numbered and requested != min(numbered):
+            found[category] = numbered[requested]
     return found
 
 

@@ -72,18 +72,18 @@ def build_dataset(
     return {category: len(found) for category, found in sizes.items()}
 
 
-def write_models(out: pathlib.Path, wanted: Mapping[str, Collection[int]], seed: int = 0) -> None:
+def write_models(out: pathlib.Path, requested: Mapping[str, Collection[int]], seed: int = 0) -> None:
     """Writes some models of some categories, in this process, with metadata as for all models of these categories.
 
     Args:
-      wanted: category -> numbers of models.
+      requested: category -> numbers of models.
     """
-    entries = _chosen(wanted)
+    entries = _chosen(requested)
     sizes: dict[str, list[list[float]]] = {}
     for entry in entries:
         bounds = [build_model(entry, index, seed).bounds() for index in range(entry.count)]
         sizes[entry.category] = [[float(v) for v in high - low] for low, high in bounds]
-        for index in sorted(set(wanted[entry.category])):
+        for index in sorted(set(requested[entry.category])):
             write_model(build_model(entry, index, seed), out / "objects")
     write_metadata(out, entries, sizes)
 

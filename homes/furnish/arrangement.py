@@ -106,10 +106,12 @@ class Arrangement:
 
     def free(self, zone: np.ndarray) -> bool:
         """Whether nothing but a carpet lies in a box [2, 3]."""
-        wanted = _Group(None, _block_hulls(zone[None]))
-        near = self._solid.near(wanted)
+        requested = _Group(None, _block_hulls(zone[None]))
+        near = self._solid.near(requested)
         return not any(
-            _overlaps(wanted.boxes, group.boxes).any() for group in near if group.thing is None or not group.low_lying
+            _overlaps(requested.boxes, group.boxes).any()
+            for group in near
+            if group.thing is None or not group.low_lying
         )
 
     def overlapping_boxes(self) -> list[list[str]]:

@@ -47,12 +47,12 @@ class HomeInProgress:
         """So many objects are wanted that there is no need to save any."""
         return self.limit is None or self.limit >= ROOMY
 
-    def index(self, category: str, wanted: Callable[[Shape], bool] | None = None) -> int:
-        """A model number; wanted: only models that this says yes to, where there are any."""
+    def index(self, category: str, requested: Callable[[Shape], bool] | None = None) -> int:
+        """A model number; requested: only models that this says yes to, where there are any."""
         entry = find(category)
         numbers = list(range(entry.count))
-        if wanted is not None:
-            numbers = [k for k in numbers if wanted(shape(category, k, self.seed))] or numbers
+        if requested is not None:
+            numbers = [k for k in numbers if requested(shape(category, k, self.seed))] or numbers
         return numbers[self.rng.randrange(min(len(numbers), self.models if entry.fixed else self.small_models))]
 
     def now(self) -> tuple[Arrangement, np.ndarray]:

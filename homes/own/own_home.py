@@ -82,13 +82,13 @@ class OwnHome:
 def build_own(home: HomeDescription, root: pathlib.Path) -> OwnHome:
     """Writes `scenes/<name>` and its models into a dataset root. Raises InputError."""
     made = furnish_own(home, make_own_plan(home))
-    loose, wanted = _loose(home, root)
+    loose, requested = _loose(home, root)
     things = list(made.things.things.values())
     pieces = tuple(_own_piece(thing) for thing in things if is_own(thing))
     for thing in things:
         if not is_own(thing):
-            wanted.setdefault(thing.category, set()).add(thing.index % find(thing.category).count)
-    write_models(root, wanted, home.seed)
+            requested.setdefault(thing.category, set()).add(thing.index % find(thing.category).count)
+    write_models(root, requested, home.seed)
     write_scene(root, made.plan, made.things, home.seed, skipped=[piece.name for piece in pieces])
     return OwnHome(home, made, pieces, tuple(loose))
 
@@ -114,7 +114,7 @@ def _own_piece(thing: Placed) -> OwnPiece:
 def _loose(home: HomeDescription, root: pathlib.Path) -> tuple[list[LooseObject], dict[str, set[int]]]:
     """Loose objects, and the models of the catalogue that they need: category -> numbers."""
     found: list[LooseObject] = []
-    wanted: dict[str, set[int]] = {}
+    requested: dict[str, set[int]] = {}
     rng = random.Random(f"{home.seed}/{home.name}/objects")
     for key, spec in home.objects.items():
         element = f"objects.{key}"
@@ -126,12 +126,12 @@ def _loose(home: HomeDescription, root: pathlib.Path) -> tuple[list[LooseObject]
                 raise home.error(element, "its model is fixed", "convert it without --fixed, or make it furniture")
         else:
             index = rng.randrange(min(find(category).count, SMALL_MODELS)) if number is None else number
-            wanted.setdefault(category, set()).add(index)
+            requested.setdefault(category, set()).add(index)
             kind, model = category, build_model(find(category), index, home.seed).model
             source = root / "objects" / category / model / f"{model}.urdf"
         for name in copies(key, spec):
             found.append(LooseObject(name, key, kind, model, source, _conditions(spec, key, name)))
-    return found, wanted
+    return found, requested
 
 
 def _conditions(spec: LooseSpec, key: str, name: str) -> tuple[str, ...]:

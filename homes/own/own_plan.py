@@ -145,8 +145,8 @@ def _shared(
     """Pieces of wall between two rooms, or of a room and the outside. Raises InputError."""
     if a == b:
         raise home.error(f"{element}.between", "names one room twice")
-    wanted = {a, b} - {None}
-    edges = [edge for edge in plan.edges if set(edge.rooms) == wanted]
+    requested = {a, b} - {None}
+    edges = [edge for edge in plan.edges if set(edge.rooms) == requested]
     if not edges:
         first, second = a, b if b is not None else "the outside"
         others = sorted({r for e in plan.edges if a in e.rooms for r in e.rooms if r != a})

@@ -51,9 +51,9 @@ def test_turns_of_a_hand_are_about_the_axes_of_the_body(tiny_home_folder, compat
     for turn in ({"yaw": np.pi / 4, "pitch": 0.0},) * 2 + ({"yaw": 0.0, "pitch": np.pi / 4},) * 2:
         world.act(right_hand_yaw=turn["yaw"], right_hand_pitch=turn["pitch"])
         world.act(times=3)
-    wanted = Rotation.from_euler("y", np.pi / 2) * Rotation.from_euler("z", np.pi / 2)
+    expected = Rotation.from_euler("y", np.pi / 2) * Rotation.from_euler("z", np.pi / 2)
     turned = rotation(world.quat("humanoid_right_hand")) * start.inv()
-    assert (wanted.inv() * turned).magnitude() < 1e-2
+    assert (expected.inv() * turned).magnitude() < 1e-2
 
 
 @pytest.mark.slow

@@ -53,9 +53,9 @@ def test_a_lacking_extra_is_optional_and_names_the_extra():
 
 
 def test_what_ig2mj_asks_for_is_installed_here():
-    wanted = requirements()
-    assert diagnosis.healthy(diagnosis.package_checks(wanted))
-    assert {("mujoco", None), ("jax", None), ("coacd", "convert")} <= {(r.name, extra) for r, extra in wanted}
+    expected = requirements()
+    assert diagnosis.healthy(diagnosis.package_checks(expected))
+    assert {("mujoco", None), ("jax", None), ("coacd", "convert")} <= {(r.name, extra) for r, extra in expected}
 
 
 @pytest.mark.parametrize(("driver", "extra"), [(580, "gpu"), (550, "gpu-cuda12")])

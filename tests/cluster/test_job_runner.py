@@ -39,10 +39,10 @@ def everything(work: JobSet, where: Where = Where(), **options) -> tuple[list[by
 
 
 def test_the_same_results_here_and_on_two_processes():
-    wanted = work(shared={"file": b"content"})
-    here, failed = everything(wanted)
+    expected = work(shared={"file": b"content"})
+    here, failed = everything(expected)
     assert not failed and len(set(here)) == 5
-    assert everything(wanted, Where(jobs=2)) == (here, {})
+    assert everything(expected, Where(jobs=2)) == (here, {})
 
 
 @pytest.mark.parametrize(
@@ -110,14 +110,14 @@ class Killed(Exception):
 
 
 def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
-    out, wanted, count = tmp_path / "pool.npz", work(note=str(tmp_path)), []
+    out, expected, count = tmp_path / "pool.npz", work(note=str(tmp_path)), []
 
     def die_after_three(done, total, text="") -> None:
         if done == 3:
             raise Killed
 
     with pytest.raises(Killed), Journal(out, {"rows": 5}) as journal:
-        map_jobs(wanted, Where(), journal, die_after_three)
+        map_jobs(expected, Where(), journal, die_after_three)
     with (tmp_path / "pool.npz.jobs" / "done.jsonl").open("a") as lines:
         lines.write('{"name": "job_4", "sha2')  # half a line, as a kill leaves it
     with pytest.raises(InputError, match=r"an earlier run was interrupted \(--resume continues it"):
@@ -126,7 +126,7 @@ def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
         Journal(out, {"rows": 6}, resume=True)
     before = set(tmp_path.glob("*-*"))
     with Journal(out, {"rows": 5}, resume=True) as journal:
-        count, failed = everything(wanted, store=journal)
+        count, failed = everything(expected, store=journal)
         journal.finish()
     assert count == everything(work())[0] and not failed
     assert len(set(tmp_path.glob("*-*")) | before) == 5 and len(before) == 3, "finished jobs were not done again"
@@ -157,13 +157,13 @@ def test_a_command_that_was_killed_goes_on_to_the_same_bytes(tmp_path):
 
 
 def test_a_result_that_is_damaged_is_made_again(tmp_path):
-    out, wanted = tmp_path / "pool.npz", work()
+    out, expected = tmp_path / "pool.npz", work()
     with Journal(out, {}) as journal:
-        first, _ = everything(wanted, store=journal)
+        first, _ = everything(expected, store=journal)
     (tmp_path / "pool.npz.jobs" / "job_1.bin").write_bytes(b"half")
     with Journal(out, {}, resume=True) as journal:
         assert "job_1" not in journal.names() and len(journal.names()) == 4
-        assert everything(wanted, store=journal)[0] == first
+        assert everything(expected, store=journal)[0] == first
 
 
 def test_a_run_that_finished_nothing_is_begun_anew(tmp_path):

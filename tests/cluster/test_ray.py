@@ -53,16 +53,16 @@ def test_a_node_that_dies_costs_nothing(joined, tmp_path):
     ray.init(address=joined.address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
     try:
         wait_for_nodes(ray, 2)
-        wanted, killed = jobs(30, seconds=0.3, note=str(tmp_path)), []
+        expected, killed = jobs(30, seconds=0.3, note=str(tmp_path)), []
 
         def kill_once(done, total, text="") -> None:
             if done >= 6 and not killed:
                 killed.append(done)
                 threading.Thread(target=joined.kill_node).start()
 
-        store, failed = map_jobs(wanted, Where(cluster=joined.address), progress=kill_once)
+        store, failed = map_jobs(expected, Where(cluster=joined.address), progress=kill_once)
         assert killed and not failed
-        assert [store.get(p.name) for p in wanted.jobs] == [local.get(p.name) for p in wanted.jobs]
+        assert [store.get(p.name) for p in expected.jobs] == [local.get(p.name) for p in expected.jobs]
         workers = {file.name.split("-")[1] for file in tmp_path.iterdir()}
         assert len(workers) >= 2, "both nodes worked"
         wait_for_nodes(ray, 1)
@@ -143,23 +143,23 @@ def test_a_node_without_the_files_or_with_another_version_is_told_before_any_wor
 
     note = tmp_path / "note"
     note.mkdir()
-    wanted = jobs(3, note=str(note))
+    expected = jobs(3, note=str(note))
     ray.init(address=joined.address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
     try:
         wait_for_nodes(ray, 2)
         file = tmp_path / "scene.xml"
         file.write_text("here")
-        other = JobSet(wanted.function, "", wanted.jobs, check=("job_functions:node_files", {"path": str(file)}))
+        other = JobSet(expected.function, "", expected.jobs, check=("job_functions:node_files", {"path": str(file)}))
         monkeypatch.setattr(ray_nodes, "digest_seen", lambda check: "what this machine has")
         with pytest.raises(ClusterError, match=r"node .* has other files than this machine"):
             run(other, Where(cluster=joined.address))
-        gone = JobSet(wanted.function, "", wanted.jobs, check=("job_functions:node_files", {"path": "/no/such"}))
+        gone = JobSet(expected.function, "", expected.jobs, check=("job_functions:node_files", {"path": "/no/such"}))
         with pytest.raises(ClusterError, match=r"node .*: .*No such file or directory: '/no/such'"):
             run(gone, Where(cluster=joined.address))
         monkeypatch.undo()
         monkeypatch.setattr(ray_nodes, "versions", lambda: {"ig2mj": "9.9 (abc)"})
         with pytest.raises(ClusterError, match=r"node .* has ig2mj .*, not 9.9"):
-            map_jobs(wanted, Where(cluster=joined.address))
+            map_jobs(expected, Where(cluster=joined.address))
         assert not list(note.iterdir()), "no job was begun"
     finally:
         ray.shutdown()

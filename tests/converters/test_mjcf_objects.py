@@ -26,8 +26,8 @@ def test_no_self_collision_inside_an_object(house):
 def test_every_pair_of_bodies_of_one_object_is_excluded(house):
     m = house.model
     names = ("bottom_cabinet_0", "bottom_cabinet_0_link_0", "bottom_cabinet_0_link_1")
-    wanted = {frozenset(m.body(b).id for b in pair) for pair in itertools.combinations(names, 2)}
-    assert wanted <= {frozenset((s >> 16, s & 0xFFFF)) for s in m.exclude_signature.tolist()}
+    expected = {frozenset(m.body(b).id for b in pair) for pair in itertools.combinations(names, 2)}
+    assert expected <= {frozenset((s >> 16, s & 0xFFFF)) for s in m.exclude_signature.tolist()}
 
 
 def test_links_and_joints_carry_the_objects_name(house):

@@ -80,8 +80,8 @@ def test_the_slurm_script_is_a_script_that_trains():
     file = FOLDER / "train.slurm"
     assert subprocess.run(["bash", "-n", str(file)], capture_output=True).returncode == 0
     lines = file.read_text().splitlines()
-    wanted = dict(line[len("#SBATCH --") :].partition("=")[::2] for line in lines if line.startswith("#SBATCH --"))
-    assert {"nodes", "ntasks-per-node", "gpus-per-node", "time"} <= set(wanted)
+    expected = dict(line[len("#SBATCH --") :].partition("=")[::2] for line in lines if line.startswith("#SBATCH --"))
+    assert {"nodes", "ntasks-per-node", "gpus-per-node", "time"} <= set(expected)
     command = re.sub(r"\\\n", " ", file.read_text()).split("srun", 1)[1]
     assert options(shlex.split(command.split("ig2mj train")[1])) <= known()
     first = next(n for n, line in enumerate(lines) if line and not line.startswith("#"))

@@ -96,7 +96,7 @@ def test_velocities_from_joints_are_mujocos():
         moved = Moved(*(jnp.asarray(array[None], jnp.float32) for array in arrays))
         linear, angular = body_velocities(joints_above(model, np.arange(model.nbody)), moved)
         for body in range(model.nbody):
-            wanted = np.zeros(6)
-            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, wanted, 0)
-            np.testing.assert_allclose(linear[0, body], wanted[3:], atol=1e-4)
-            np.testing.assert_allclose(angular[0, body], wanted[:3], atol=1e-4)
+            expected = np.zeros(6)
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, expected, 0)
+            np.testing.assert_allclose(linear[0, body], expected[3:], atol=1e-4)
+            np.testing.assert_allclose(angular[0, body], expected[:3], atol=1e-4)

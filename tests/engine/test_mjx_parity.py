@@ -67,7 +67,7 @@ def test_one_step_from_the_same_state(name, bench_folder, falling, native_single
     """Velocities are accelerations times 1/120 s: an error of 0.001 m/s is 0.1 m/s^2, of contacts of 100 and more.
     MJX-JAX finds other points where an edge lies on a face, so it is given more."""
     slack = {"warp": 1e-3, "jax": 2e-2}[name]
-    wanted, wanted_view, _ = one_step(native_single, falling)
+    expected, wanted_view, _ = one_step(native_single, falling)
     got, view, _ = one_step(engine_bench.bench(bench_folder, name), falling)
     for field in ("body_pos", "body_quat", "object_com", "aabb_low", "aabb_high", "link_pos"):
         np.testing.assert_allclose(
@@ -75,8 +75,8 @@ def test_one_step_from_the_same_state(name, bench_folder, falling, native_single
         )
     np.testing.assert_array_equal(view.touching, wanted_view.touching)
     np.testing.assert_array_equal(view.awake, wanted_view.awake)
-    np.testing.assert_allclose(got.qvel, wanted.qvel, atol=slack)
-    assert float(got.time) == pytest.approx(float(wanted.time), abs=1e-6)
+    np.testing.assert_allclose(got.qvel, expected.qvel, atol=slack)
+    assert float(got.time) == pytest.approx(float(expected.time), abs=1e-6)
 
 
 @pytest.mark.parametrize("name", PURE)
@@ -87,12 +87,12 @@ def test_forces_of_one_step_agree_to_a_thousandth(name, bench_folder, native, na
     lifted = native.write(lifted, native.teleport("knife", [0.3, 0.1, 0.9], TIPPED))
     physics, _ = native.run(lifted, 2)
     pressing = native.engine.export(physics, 0)
-    _, _, wanted = one_step(native_single, pressing)
+    _, _, expected = one_step(native_single, pressing)
     _, _, got = one_step(engine_bench.bench(bench_folder, name), pressing)
-    assert np.abs(wanted["qfrc_constraint"]).max() > 1.0, "the table catches it"
+    assert np.abs(expected["qfrc_constraint"]).max() > 1.0, "the table catches it"
     for field in FORCES:
-        largest = max(1.0, np.abs(wanted[field]).max())
-        np.testing.assert_allclose(got[field], wanted[field], atol=1e-3 * largest, err_msg=field)
+        largest = max(1.0, np.abs(expected[field]).max())
+        np.testing.assert_allclose(got[field], expected[field], atol=1e-3 * largest, err_msg=field)
 
 
 @pytest.mark.parametrize("name", PURE)
@@ -100,9 +100,9 @@ def test_kinematics_agree_to_a_hundredth_of_a_millimetre(name, bench_folder, fal
     """No step at all: a loaded state has the same poses and boxes on every engine."""
     bench = engine_bench.bench(bench_folder, name)
     other = engine_bench.bench(bench_folder, "native")
-    view, wanted = bench.view(bench.fresh(falling)), other.view(other.fresh(falling))
+    view, expected = bench.view(bench.fresh(falling)), other.view(other.fresh(falling))
     for field in ("object_pos", "object_quat", "object_com", "aabb_low", "aabb_high", "body_pos", "link_pos"):
-        np.testing.assert_allclose(getattr(view, field), getattr(wanted, field), atol=1e-5, err_msg=field)
+        np.testing.assert_allclose(getattr(view, field), getattr(expected, field), atol=1e-5, err_msg=field)
 
 
 @pytest.mark.parametrize("name", PURE)
@@ -207,9 +207,9 @@ def test_predicates_of_the_whole_bench_are_equal(bench_folder):
     qpos[native.scene.model.joint("hatch_hinge").qposadr[0]] = 0.9
     physics, _ = native.run(native.fresh(native.first.with_whole(qpos=qpos)), 60)
     row = native.engine.export(physics, 0)
-    wanted = truths(native, row)
-    assert wanted[0, -1], "the hatch is open"
-    np.testing.assert_array_equal(truths(engine_bench.bench(bench_folder, "warp", 2, False), row), wanted)
+    expected = truths(native, row)
+    assert expected[0, -1], "the hatch is open"
+    np.testing.assert_array_equal(truths(engine_bench.bench(bench_folder, "warp", 2, False), row), expected)
 
 
 FLAGS = [(c, i, s) for c in ("pyramidal", "elliptic") for i in ("implicitfast", "Euler") for s in ("enable", "disable")]

@@ -41,16 +41,16 @@ def test_places_do_not_overlap_and_all_of_the_block_can_be_used_again():
             place = draw.choice(list(held))
             arena.deallocate(place, held.pop(place))
             continue
-        wanted = draw.randrange(0, 6 * ALIGNMENT)
-        place = arena.allocate(wanted)
+        requested = draw.randrange(0, 6 * ALIGNMENT)
+        place = arena.allocate(requested)
         if place >= start:
-            assert place % ALIGNMENT == 0 and place + wanted <= start + size
-            assert all(place + max(wanted, 1) <= p or p + max(s, 1) <= place for p, s in held.items() if p >= start)
-            held[place] = wanted
+            assert place % ALIGNMENT == 0 and place + requested <= start + size
+            assert all(place + max(requested, 1) <= p or p + max(s, 1) <= place for p, s in held.items() if p >= start)
+            held[place] = requested
         else:
-            arena.deallocate(place, wanted)
-    for place, wanted in held.items():
-        arena.deallocate(place, wanted)
+            arena.deallocate(place, requested)
+    for place, requested in held.items():
+        arena.deallocate(place, requested)
     assert not elsewhere.held
     assert arena.allocate(size) == start
 

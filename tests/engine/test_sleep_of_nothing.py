@@ -30,23 +30,23 @@ def model_of(bodies: str) -> mujoco.MjModel:
 )
 def test_a_restored_sleep_state_is_what_mujoco_itself_makes_of_it(bodies):
     model = model_of(bodies)
-    wanted, data = mujoco.MjData(model), mujoco.MjData(model)
+    expected, data = mujoco.MjData(model), mujoco.MjData(model)
     for _ in range(3):
-        mujoco.mj_step(model, wanted)
-    mujoco.mj_copyState(model, wanted, data, mujoco.mjtState.mjSTATE_INTEGRATION)
+        mujoco.mj_step(model, expected)
+    mujoco.mj_copyState(model, expected, data, mujoco.mjtState.mjSTATE_INTEGRATION)
     mujoco.mj_forward(model, data)
     data.body_awake[:] = -7
-    restore_sleep(model, data, wanted.tree_asleep)
+    restore_sleep(model, data, expected.tree_asleep)
     for name in ("tree_asleep", "tree_awake", "body_awake"):
-        np.testing.assert_array_equal(getattr(data, name), getattr(wanted, name), err_msg=name)
+        np.testing.assert_array_equal(getattr(data, name), getattr(expected, name), err_msg=name)
     for count, ids in (
         ("nbody_awake", "body_awake_ind"),
         ("nparent_awake", "parent_awake_ind"),
         ("nv_awake", "dof_awake_ind"),
     ):
-        number = getattr(wanted, count)
+        number = getattr(expected, count)
         assert getattr(data, count) == number, count
-        np.testing.assert_array_equal(getattr(data, ids)[:number], getattr(wanted, ids)[:number], err_msg=ids)
+        np.testing.assert_array_equal(getattr(data, ids)[:number], getattr(expected, ids)[:number], err_msg=ids)
 
 
 def test_a_scene_without_anything_that_moves_is_reset_saved_loaded_and_stepped(tmp_path):

@@ -25,12 +25,12 @@ def test_each_vector_keeps_its_direction_and_what_is_slower_stays_to_the_bit():
     slow = np.random.default_rng(0).normal(0, 10, 12)
     for xp in (np, jnp):
         limited = np.asarray(LIMITS.limited(xp.asarray(np.array([fast, slow]), xp.float32)))
-        wanted = [18, 0, 24, 0.1, 0.2, 0.3, 0, -36, 48, -60, 30, 900]
-        np.testing.assert_allclose(limited[0], wanted, rtol=1e-6)
+        expected = [18, 0, 24, 0.1, 0.2, 0.3, 0, -36, 48, -60, 30, 900]
+        np.testing.assert_allclose(limited[0], expected, rtol=1e-6)
         assert (limited[1] == slow.astype(np.float32)).all()
     held = fast.copy()
     LIMITS.hold(held)
-    np.testing.assert_allclose(held, wanted)
+    np.testing.assert_allclose(held, expected)
 
 
 def test_what_is_no_number_stays_none():

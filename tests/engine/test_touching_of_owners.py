@@ -17,8 +17,8 @@ def test_owners_touch_where_any_of_their_units_do(units):
     owner = rng.integers(-1, 7, units)  # -1: an agent's, or of nobody
     own = owner == np.arange(8)[:, None]  # the last owner has no unit
     first, other = slots(owner, 8), slots(owner, 3)
-    wanted = np.einsum("ou,wuv,pv->wop", own, touching, own) > 0
-    assert units < 31 or 0 < wanted.mean() < 1
+    expected = np.einsum("ou,wuv,pv->wop", own, touching, own) > 0
+    assert units < 31 or 0 < expected.mean() < 1
     words = packed(jnp.asarray(touching))
-    np.testing.assert_array_equal(of_owners(words, first, first), wanted)
-    np.testing.assert_array_equal(of_owners(words, first, other), wanted[:, :, :3])
+    np.testing.assert_array_equal(of_owners(words, first, first), expected)
+    np.testing.assert_array_equal(of_owners(words, first, other), expected[:, :, :3])

@@ -26,8 +26,8 @@ def test_what_is_remembered_ends_with_the_episode_also_where_the_next_begins_by_
     for _ in range(env.task.horizon + 3):
         state = env.step_autoreset(state, actor(state))
         seen.append(np.asarray(actor._kept)[:, 0])
-    wanted = np.arange(env.task.horizon + 3) % env.task.horizon
-    np.testing.assert_array_equal(np.stack(seen), np.stack([wanted, wanted], axis=1))
+    expected = np.arange(env.task.horizon + 3) % env.task.horizon
+    np.testing.assert_array_equal(np.stack(seen), np.stack([expected, expected], axis=1))
     played = play(env, actor, 2, in_order=True)
     assert len(played.total) == 2 and (np.asarray(actor._kept) == env.task.horizon - 1).all(), (
         "and with a start from rows"

@@ -118,7 +118,7 @@ def test_a_text_is_the_name_of_one_observation():
 
 def test_a_text_is_one_name_wherever_names_are_taken(tiny_home_folder):
     home = load_scene(tiny_home_folder, agents=[Humanoid(pos=(0.3, 0.6, 0.6))], objects="apple")
-    assert [a.wanted for a in home.additions] == ["apple/apple_00"]
+    assert [a.requested for a in home.additions] == ["apple/apple_00"]
     assert Grasping(home, "mitten", "can")._targets.sum() == 1
     assert check_names("geom_friction") == ("geom_friction",)
 

@@ -27,10 +27,10 @@ def test_a_step_is_that_of_the_mean_gradient(largest):
     mean = jax.tree.map(lambda a: a.mean(0), slopes)
     plain: Any = optax.chain(optax.clip_by_global_norm(largest), optax.scale_by_adam(eps=1e-3))
     shared: Any = averaged_adam(largest, "devices", eps=1e-3)
-    wanted, state = plain.init(mean), shared.init(mean)
+    expected, state = plain.init(mean), shared.init(mean)
     update = jax.vmap(shared.update, in_axes=(0, None), axis_name="devices", out_axes=0)
     for _ in range(2):
-        step, wanted = plain.update(mean, wanted)
+        step, expected = plain.update(mean, expected)
         found, states = update(slopes, state)
         state = jax.tree.map(lambda a: a[0], states)
         for name in SHAPES:

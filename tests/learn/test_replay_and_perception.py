@@ -196,8 +196,8 @@ def test_a_policy_that_acts_on_its_prediction_takes_it_along(tmp_path):
     sees = perception_of(again, spaces)
     assert sees.image_shape == (12, 16, 4) and sees.rows == (4, 16)
     obs = {**env.reset(0).obs, "privileged_state": jnp.zeros((2, 7))}
-    wanted = jax.jit(sac._look)(learner.actor, learner.moments, perception(obs))[0]
-    assert np.allclose(jax.jit(again.actor(sees))(obs), np.tanh(wanted), atol=0.02), "half precision"
+    expected = jax.jit(sac._look)(learner.actor, learner.moments, perception(obs))[0]
+    assert np.allclose(jax.jit(again.actor(sees))(obs), np.tanh(expected), atol=0.02), "half precision"
     with pytest.raises(PolicyMismatch, match="rows"):
         again.check(env, Perception(env.observation_spaces, "rgbd", 16, (0, 12)))
 
@@ -213,9 +213,9 @@ def test_a_guess_is_of_rotations_and_not_of_the_sign_of_a_quaternion():
     assert np.allclose(found[0, :2], [0.1, 1.0])
     assert np.allclose(found[0, 2:] / 3**0.5, [-0.28, 0.96, 0, 0.96, 0.28, 0], atol=1e-6), "columns x and y"
     assert PrivilegedTargets(2, 7).size == 7, "numbers without names are guessed as they are"
-    wanted = jnp.asarray(hidden(vector, vector))
+    expected = jnp.asarray(hidden(vector, vector))
     for number, more in ((0, 1.0), (5, 3.0)):  # a place: the absolute error; a rotation: its square
-        one, two = (float(hidden.loss(wanted.at[:, number].add(far), vector, vector)) for far in (1.0, 2.0))
+        one, two = (float(hidden.loss(expected.at[:, number].add(far), vector, vector)) for far in (1.0, 2.0))
         assert two - one == pytest.approx(more / hidden.size, abs=1e-3)
     assert prediction_loss(jnp.ones((1, 2)), jnp.ones((1, 2))) == 0
     far, farther = (float(prediction_loss(jnp.full((1, 1), x), jnp.zeros((1, 1)))) for x in (1.0, 2.0))

@@ -95,9 +95,9 @@ def test_a_command_may_have_commands_itself(capsys):
         ),
     ],
 )
-def test_what_does_not_fit_or_clashes_is_refused(wanted, line):
+def test_what_does_not_fit_or_clashes_is_refused(expected, line):
     with pytest.raises(PluginError, match=line):
-        ig2mj.register(**wanted)
+        ig2mj.register(**expected)
 
 
 def test_all_of_a_call_is_registered_or_nothing():

@@ -31,7 +31,7 @@ def test_a_cheapest_reading_of_finite_cost_makes_the_goal_true(seed):
 
 def _check_reading(goal, now):
     truth = dict(zip(ATOMS, now, strict=True))
-    cost, reading = cheapest(goal, lambda atom, wanted: float(truth[atom] != wanted))
+    cost, reading = cheapest(goal, lambda atom, expected: float(truth[atom] != expected))
     if not math.isinf(cost):
         assert value_of(goal, {**truth, **reading})
     if value_of(goal, truth):
@@ -41,8 +41,8 @@ def _check_reading(goal, now):
 def test_a_reading_takes_the_cheaper_alternative_and_none_that_cannot_be():
     price = {A: 5.0, B: 1.0, C: math.inf, D: 2.0}
 
-    def cost(atom, wanted):
-        return price[atom] if wanted else 0.0
+    def cost(atom, expected):
+        return price[atom] if expected else 0.0
 
     assert cheapest(Or((A, B)), cost) == (1.0, {B: True})
     assert cheapest(Or((A, C)), cost) == (5.0, {A: True})
@@ -54,7 +54,7 @@ def test_a_pairing_is_the_cheapest_assignment():
     cells = {(i, j): Atom("p", (str(i), str(j))) for i in range(3) for j in range(3)}
     price = {(0, 0): 1, (0, 1): 2, (0, 2): 9, (1, 0): 1, (1, 1): 9, (1, 2): 9, (2, 0): 9, (2, 1): 9, (2, 2): 3}
     pairing = Pairing(3, tuple(tuple(cells[i, j] for j in range(3)) for i in range(3)))
-    cost, reading = cheapest(pairing, lambda atom, wanted: float(price[tuple(map(int, atom.arguments))]))
+    cost, reading = cheapest(pairing, lambda atom, expected: float(price[tuple(map(int, atom.arguments))]))
     best = min(sum(price[i, j] for i, j in enumerate(order)) for order in itertools.permutations(range(3)))
     assert cost == best == 6 and reading == {cells[0, 1]: True, cells[1, 0]: True, cells[2, 2]: True}
 
@@ -62,8 +62,11 @@ def test_a_pairing_is_the_cheapest_assignment():
 def test_parts_that_would_contradict_each_other_take_the_next_best():
     price = {A: 1.0, B: 4.0, C: 1.0, D: 2.0}
     goal = And((Or((A, B)), Or((And((C, Not(A))), And((D, Not(A))))), Or((A, C))))
-    assert cheapest(goal, lambda atom, wanted: price[atom] if wanted else 0.0) == (6.0, {B: True, C: True, A: False})
-    assert math.isinf(cheapest(And((A, Not(A))), lambda atom, wanted: 0.0)[0])
+    assert cheapest(goal, lambda atom, expected: price[atom] if expected else 0.0) == (
+        6.0,
+        {B: True, C: True, A: False},
+    )
+    assert math.isinf(cheapest(And((A, Not(A))), lambda atom, expected: 0.0)[0])
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -73,8 +76,8 @@ def test_a_reading_is_found_exactly_where_the_goal_can_be_true(seed):
         goal = random_goal(rng)
         price = {a: rng.randint(0, 9) for a in ATOMS}
 
-        def cost(atom, wanted, price=price):
-            return float(price[atom] * wanted)
+        def cost(atom, expected, price=price):
+            return float(price[atom] * expected)
 
         value, reading = cheapest(goal, cost)
         true = [

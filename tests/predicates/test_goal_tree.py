@@ -28,7 +28,7 @@ def test_a_literal_that_is_missing_says_why_and_one_that_holds_says_nothing(worl
 def test_under_not_the_opposite_is_wanted(world):
     found = parts(world, "(not (or (cooked apple) (toggled_on stove)))")
     assert found.holds and found.fine
-    assert [(p.wanted, p.fine) for p in found.parts[0].parts] == [(False, True)] * 2
+    assert [(p.expected, p.fine) for p in found.parts[0].parts] == [(False, True)] * 2
 
 
 def test_quantifiers_are_written_out(world):

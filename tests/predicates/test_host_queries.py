@@ -71,8 +71,8 @@ def test_questions_and_goals_agree_on_every_pair_of_a_cluttered_scene(compat):
         for relation in RELATIONS:
             rows = [(HOME.index[a], HOME.index[b]) for a, b in pairs]
             found = questions.holds(find(relation), rows, states, view)[0]
-            wanted = expected[[place[atom(relation, a, b)] for a, b in pairs]]
-            np.testing.assert_array_equal(found, wanted, err_msg=f"{relation}, seed {seed}")
+            requested = expected[[place[atom(relation, a, b)] for a, b in pairs]]
+            np.testing.assert_array_equal(found, requested, err_msg=f"{relation}, seed {seed}")
             seen |= {(relation, bool(value)) for value in found}
             for k in rng.choice(len(rows), 6, replace=False):
                 alone = _with_others_elsewhere(view, _cluttered(seed + 100), rows[k])

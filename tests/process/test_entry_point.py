@@ -110,10 +110,10 @@ def of_sampling(tiny_home) -> list:
     "of", [of_simulation, *(pytest.param(f, marks=pytest.mark.slow) for f in (of_worlds, of_sampling, of_environment))]
 )
 def test_results_are_the_same_to_the_bit_in_double_precision(of, tiny_home):
-    wanted = jax.tree.map(np.asarray, of(tiny_home))
+    expected = jax.tree.map(np.asarray, of(tiny_home))
     with jax.enable_x64(True):
         found = jax.tree.map(np.asarray, of(tiny_home))
-    for (path, a), b in zip(jax.tree_util.tree_leaves_with_path(wanted), jax.tree.leaves(found), strict=True):
+    for (path, a), b in zip(jax.tree_util.tree_leaves_with_path(expected), jax.tree.leaves(found), strict=True):
         assert a.dtype == b.dtype, path
         assert np.array_equal(a, b, equal_nan=a.dtype.kind == "f"), path
 

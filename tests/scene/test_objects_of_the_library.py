@@ -69,16 +69,16 @@ def test_an_addition_with_a_place_is_fixed_there(plain):
         assert entry.fixed and not entry.assisted_grasp and body.dofnum[0] == 0
         assert np.allclose(data.xpos[body.id], pos) and np.allclose(data.xquat[body.id], quat)
     assert scene.model.nq == plain.model.nq + 4 * 7
-    assert [a.wanted for a in scene.additions][1] == "shelf/shelf_14@-1,-3.4,0.9,90"
-    again = load_scene("birch", objects=[a.wanted for a in scene.additions])
+    assert [a.requested for a in scene.additions][1] == "shelf/shelf_14@-1,-3.4,0.9,90"
+    again = load_scene("birch", objects=[a.requested for a in scene.additions])
     elsewhere = load_scene("birch", objects=["steak", "shelf@-1,-3.4,0.8,90", "mug@0.5,0.25,1,0", "apple"])
     assert scene.digest == again.digest != elsewhere.digest
 
 
 @pytest.mark.parametrize("wanted", ["shelf", "shelf@1,2", "shelf@1,2,3,left"])
-def test_fixed_furniture_wants_a_place_of_four_numbers(wanted):
+def test_fixed_furniture_wants_a_place_of_four_numbers(expected):
     with pytest.raises(Ig2mjError, match=r"1,2,0\.9,-90|x,y,z,yaw"):
-        load_scene("birch", objects=[wanted])
+        load_scene("birch", objects=[expected])
 
 
 def test_equal_models_share_their_meshes(plain, stocked):
@@ -153,6 +153,6 @@ def test_hashes_tell_models_apart_and_stay_the_same(stocked):
     ("wanted", "telling"),
     [("applee", "near matches: apple"), ("apple/apple_77", "no model of 'apple'"), ("fridge", "no category")],
 )
-def test_what_the_library_lacks_is_named(wanted, telling):
+def test_what_the_library_lacks_is_named(expected, telling):
     with pytest.raises(UnknownNameError, match=telling):
-        load_scene("small_home", objects=[wanted])
+        load_scene("small_home", objects=[expected])

@@ -52,9 +52,9 @@ def test_an_object_of_ones_own_starts_at_its_place_and_can_move(tiny_home_folder
     assert [scene.object(n).fixed for n in ("cup_0", "cup_1", "mug_0")] == [False, True, False]
     assert [scene.object(n).assisted_grasp for n in ("cup_0", "cup_1")] == [True, False]
     assert np.allclose(data.body("mug_0").xpos, (0, 0, 2))
-    again = ig2mj.load_scene(tiny_home_folder, objects=[a.wanted for a in scene.additions])
+    again = ig2mj.load_scene(tiny_home_folder, objects=[a.requested for a in scene.additions])
     elsewhere = ig2mj.load_scene(
-        tiny_home_folder, objects=[f"{cup}@0.5,0.25,1.1,90", *[a.wanted for a in scene.additions[1:]]]
+        tiny_home_folder, objects=[f"{cup}@0.5,0.25,1.1,90", *[a.requested for a in scene.additions[1:]]]
     )
     assert scene.digest == again.digest != elsewhere.digest
     assert again.additions == scene.additions
@@ -87,12 +87,12 @@ def test_furniture_is_made_by_a_command_that_the_error_names(tiny_home_folder):
 
 @pytest.mark.slow
 def test_a_predicate_says_where_an_object_starts_in_the_same_place_every_time(tiny_home_folder, cup):
-    wanted = [f"{cup}@on_top:box", f"{cup}@on_top:box"]
-    simulation = ig2mj.Simulation(tiny_home_folder, objects=wanted)
+    expected = [f"{cup}@on_top:box", f"{cup}@on_top:box"]
+    simulation = ig2mj.Simulation(tiny_home_folder, objects=expected)
     assert simulation.predicate("on_top", "cup_0", "box") and simulation.predicate("on_top", "cup_1", "box")
     places = [a.start for a in simulation.scene.additions]
     assert places[0] != places[1]
-    assert [a.start for a in ig2mj.load_scene(tiny_home_folder, objects=wanted).additions] == places
+    assert [a.start for a in ig2mj.load_scene(tiny_home_folder, objects=expected).additions] == places
     simulation.step(count=30)
     assert simulation.predicate("on_top", "cup_0", "box")
 
@@ -128,9 +128,9 @@ def test_assets_of_the_same_name_and_other_content_are_kept_apart(tiny_home_fold
         ("", "neither a folder nor a name"),
     ],
 )
-def test_what_is_no_object_is_said_in_one_line_with_both_readings(tiny_home_folder, wanted, said):
+def test_what_is_no_object_is_said_in_one_line_with_both_readings(tiny_home_folder, expected, said):
     with pytest.raises(Ig2mjError, match=said) as error:
-        ig2mj.load_scene(tiny_home_folder, objects=[wanted])
+        ig2mj.load_scene(tiny_home_folder, objects=[expected])
     assert "\n" not in str(error.value)
 
 
@@ -204,7 +204,7 @@ def test_an_object_that_has_moved_is_found_again_in_a_library_by_its_hash(tiny_h
     monkeypatch.setenv("IG2MJ_OBJECTS", str(now.parent))
     (found,) = find_again(additions, "run.h5")
     assert found.folder == str(now)
-    scenes = [ig2mj.load_scene(tiny_home_folder, objects=a.wanted) for a in (found,)]
+    scenes = [ig2mj.load_scene(tiny_home_folder, objects=a.requested) for a in (found,)]
     assert scenes[0].object_names[-1] == "cup_0"
 
 

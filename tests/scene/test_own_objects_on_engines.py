@@ -38,8 +38,8 @@ def test_a_gripper_takes_a_cup_of_ones_own_and_lifts_it(tiny_home_folder, tiny_h
     x, y, _ = tiny_home.start_data().body("can").xpos
     robot = Fetch(pos=(0.3, 0.85, 0.0), quat=(np.sqrt(0.5), 0.0, 0.0, -np.sqrt(0.5)))
     foot = tiny_home.start_data().body("can").xpos[2] - 0.06
-    wanted = ["remove:can", f"{cup}@{x},{y},{foot + HALF},0"]
-    world = GraspingWorld(ig2mj.load_scene(tiny_home_folder, [robot], wanted))
+    expected = ["remove:can", f"{cup}@{x},{y},{foot + HALF},0"]
+    world = GraspingWorld(ig2mj.load_scene(tiny_home_folder, [robot], expected))
     cup_pos = world.body("cup_0")
     world.gripper_to(cup_pos + np.array([0, 0, 0.2]), 25, gripper=1.0)
     world.gripper_to(cup_pos + np.array([0, 0, 0.02]), 12, gripper=1.0)
@@ -67,8 +67,8 @@ def test_annotations_work_the_hot_plate_of_the_guide_cooks(repository, tiny_home
     urdf, toml = (re.search(rf"```{kind}\n(.*?)```", text, re.DOTALL)[1] for kind in ("xml", "toml"))
     (tmp_path / "plate.toml").write_text(toml)
     plate = write_object(tmp_path, "hot_plate", urdf, category="hot_plate", annotations=tmp_path / "plate.toml")
-    wanted = [f"{plate}@fixed:0.5,0.25,1,0", "steak@loose:0.5,0.25,1.1,0"]
-    simulation = ig2mj.Simulation(tiny_home_folder, objects=wanted)
+    expected = [f"{plate}@fixed:0.5,0.25,1,0", "steak@loose:0.5,0.25,1.1,0"]
+    simulation = ig2mj.Simulation(tiny_home_folder, objects=expected)
     simulation.set_state("toggled_on", "hot_plate_0", True)
     simulation.step(count=300)
     assert simulation.state("temperature", "steak_0") > 60

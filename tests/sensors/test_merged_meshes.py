@@ -96,8 +96,8 @@ def test_pictures_are_those_of_separate_meshes(scene, options):
     looks /= np.linalg.norm(looks, axis=1, keepdims=True)
     pictures = []
     for merge in (False, True):
-        wanted = {"width": 64, "height": 64, "depth": True, "segmentation": True, "merge_meshes": merge}
-        camera = BatchCamera(engine, model, ["eye/eye"], **wanted, **options)
+        expected = {"width": 64, "height": 64, "depth": True, "segmentation": True, "merge_meshes": merge}
+        camera = BatchCamera(engine, model, ["eye/eye"], **expected, **options)
         shoot = jax.jit(lambda *of, camera=camera: camera(*of, {"eye/eye": (place, looks)}))
         pictures.append(jax.tree.map(np.asarray, shoot(physics, view, states)))
     upstream, merged = pictures

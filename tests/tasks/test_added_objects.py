@@ -53,6 +53,6 @@ def test_texts_hold_whole_paths_and_are_kept_with_an_environment(cup, monkeypatc
         ("", Ig2mjError, "neither a"),
     ],
 )
-def test_what_is_no_object_is_an_error_of_make(wanted, error, said):
+def test_what_is_no_object_is_an_error_of_make(expected, error, said):
     with pytest.raises(error, match=said):
-        object_texts(wanted)
+        object_texts(expected)

@@ -33,10 +33,10 @@ def data(tiny_home) -> mujoco.MjData:
 
 def test_every_object_in_use_is_named_once_and_building_parts_are_not(tiny_home, data):
     names = [label.text for label in ObjectNames(tiny_home).labels(data)]
-    wanted = [
+    expected = [
         o.name for o in tiny_home.manifest.objects if not o.parked and o.category not in ("walls", "floors", "ceilings")
     ]
-    assert names == wanted
+    assert names == expected
     assert "apple" in names
     assert "apple_half_0" not in names
 

@@ -300,13 +300,13 @@ class Runtime:
     def xrCreateSwapchain(self, session, info, swapchain):
         from OpenGL import GL
 
-        wanted = info.contents
+        expected = info.contents
         textures = [int(GL.glGenTextures(1)) for _ in range(2)]
         for texture in textures:
             GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
-            size = (int(wanted.width), int(wanted.height))
-            GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, int(wanted.format), *size, 0, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE, None)
-        self._new({"textures": textures, "size": size, "next": 0, "format": int(wanted.format)}, swapchain)
+            size = (int(expected.width), int(expected.height))
+            GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, int(expected.format), *size, 0, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE, None)
+        self._new({"textures": textures, "size": size, "next": 0, "format": int(expected.format)}, swapchain)
 
     def xrDestroySwapchain(self, swapchain):
         pass

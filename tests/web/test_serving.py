@@ -250,8 +250,8 @@ def status_of(server: PageServer, target: str, host: str | None = None) -> int:
 def test_odd_addresses_are_bad_requests(token):
     with serving(token) as server:
         assert [status_of(server, target) for target in ("//[", "//[/a.js", "http://[")] == [400] * 3
-        wanted = 200 if token is None else 401
-        assert status_of(server, "/") == wanted
+        expected = 200 if token is None else 401
+        assert status_of(server, "/") == expected
 
 
 @pytest.mark.parametrize(

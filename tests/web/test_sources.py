@@ -45,9 +45,9 @@ def test_an_environment_goes_on_with_new_episodes_and_starts_from_any_row(env):
         facts.append(dict(source.shot(0).facts)["agent step"])
     assert facts == ["1", "2", "3", "4", "5", "6", "0", "1", "2"]
     source.reset(1, 2)
-    wanted = env.core.starts.pool.rows(np.array([2])).physics.scene.qpos[0]
+    expected = env.core.starts.pool.rows(np.array([2])).physics.scene.qpos[0]
     found = env.core.engine.export(source._state.batch.world.physics, 1).scene.qpos
-    np.testing.assert_array_equal(found, wanted)
+    np.testing.assert_array_equal(found, expected)
     assert dict(source.shot(0).facts)["agent step"] == "2" and source.shot(1).time == 0
 
 

@@ -45,11 +45,11 @@ def test_one_step_on_the_gpu_is_one_step_of_c_mujoco(bench_folder, on_gpu):
     physics, _ = native.run(physics, 24)
     row = native.engine.export(physics, 0)
     row.qvel[:2] += [0.3, 0.1]
-    physics, wanted = native.step(native.fresh(row))
+    physics, expected = native.step(native.fresh(row))
     after, view = on_gpu.physics_step(on_gpu.fresh(row))
     for field in ("body_pos", "body_quat", "object_com", "aabb_low", "aabb_high"):
-        np.testing.assert_allclose(getattr(view, field), getattr(wanted, field), atol=1e-5, err_msg=field)
-    np.testing.assert_array_equal(view.touching, wanted.touching)
+        np.testing.assert_allclose(getattr(view, field), getattr(expected, field), atol=1e-5, err_msg=field)
+    np.testing.assert_array_equal(view.touching, expected.touching)
     got = on_gpu.engine.export(after, 0)
     np.testing.assert_allclose(got.qvel, native.engine.export(physics, 0).qvel, atol=1e-3)
 
@@ -223,8 +223,8 @@ def test_resets_inside_a_program_put_flagged_worlds_right(batch_of_many, scene):
         return batch_of_many.reset_fn(batch, flagged), flagged
 
     batch, flagged = jax.jit(lambda b: jax.lax.scan(body, b, None, 3))(batch)
-    wanted = np.zeros((3, WORLDS), bool)
-    wanted[0, ::8] = True
-    np.testing.assert_array_equal(flagged, wanted)
+    expected = np.zeros((3, WORLDS), bool)
+    expected[0, ::8] = True
+    np.testing.assert_array_equal(flagged, expected)
     assert batch_of_many.metrics(batch)["fell"] == WORLDS // 8
     assert np.isfinite(np.asarray(batch.world.view.object_pos)).all()

@@ -56,8 +56,8 @@ def test_the_other_worlds_are_stepped_as_if_nothing_were(core):
     assert np.asarray(batch.flags).tolist() == [0, int(Flag.NOT_FINITE), 0]
     assert core.metrics(batch)["not_finite"] == 1 and core.metrics(alone)["not_finite"] == 0
     assert numbers(core, batch.world.physics, OTHERS) == numbers(core, alone.world.physics, OTHERS)
-    for now, wanted in zip(jax.tree.leaves(batch.world.view), jax.tree.leaves(alone.world.view), strict=True):
-        np.testing.assert_array_equal(np.asarray(now)[OTHERS], np.asarray(wanted)[OTHERS])
+    for now, expected in zip(jax.tree.leaves(batch.world.view), jax.tree.leaves(alone.world.view), strict=True):
+        np.testing.assert_array_equal(np.asarray(now)[OTHERS], np.asarray(expected)[OTHERS])
     np.testing.assert_array_equal(np.asarray(batch.world.view.body_pos)[LOST], before)
     batch, _ = core.step(core.reset(batch, batch.flags != 0), ctrl)
     new, _ = core.step(core.start(seed=0), ctrl)

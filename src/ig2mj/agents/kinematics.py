@@ -82,7 +82,7 @@ def inverse(
     """Joint positions that bring the tip to a pose, by damped least squares; a fixed number of steps, within limits.
 
     Args:
-      q: where to begin. pos, quat: wanted, in the base's frame.
+      q: where to begin. pos, quat: the target, in the base's frame.
       rest: posture that the joints return to as far as the tip is not moved by it.
       damping: of the least squares (m and rad alike). posture: share of the way to `rest` in an iteration.
       ease: weight of each joint's movement, the larger the more of it; None: all alike. The pose that is reached does

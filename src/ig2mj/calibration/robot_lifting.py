@@ -247,11 +247,11 @@ def _places(
         for q, at, along, side in rows:
             away = (at - base) * (1, 1, 0)
             reach = float(np.linalg.norm(away))
-            wanted = outward * away / max(reach, 1e-9) + np.array([0, 0, upward])
+            requested = outward * away / max(reach, 1e-9) + np.array([0, 0, upward])
             level = HEIGHTS[0] < at[2] < HEIGHTS[1] and abs(side[2]) < 0.5
             free = not in_front or away @ ahead > 0.3 * reach
-            if level and free and along @ wanted > ALIGNED and reach > 0.12:
-                good.append((q, at, wanted))
+            if level and free and along @ requested > ALIGNED and reach > 0.12:
+                good.append((q, at, requested))
         if len(good) < FEWEST:
             continue
         points = np.array([at for _, at, _ in good])

@@ -39,13 +39,13 @@ def train_from_demos(
     if demos is None:
         raise Ig2mjError("--algo bc needs --demos (`ig2mj demos collect` writes such files)")
     world, spaces = about(demos)
-    for name, wanted in (
+    for name, requested in (
         ("task", _task_name(chosen.env, world, demos)),
         ("robot", None if chosen.robot is None else robot_name(chosen.robot)),
         ("grasping", chosen.grasping),
     ):
-        if wanted is not None and world[name] != wanted:
-            raise InputError(demos, f"is of {name} {world[name]}, not {wanted}")
+        if requested is not None and world[name] != requested:
+            raise InputError(demos, f"is of {name} {world[name]}, not {requested}")
     if obs == "rgbd" and not {"rgb", "depth"} & set(spaces):
         raise InputError(demos, "holds no images", fix="`ig2mj demos collect --obs rgbd` records them")
     images = settings.image_size, settings.rows, world.get("privileged", ()), settings.depth_range or DEPTH_RANGE

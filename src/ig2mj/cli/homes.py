@@ -102,11 +102,11 @@ def model(
 
     from ig2mj.errors import UnknownNameError
 
-    category, _, wanted = name.partition("/")
+    category, _, requested = name.partition("/")
     if category not in catalogue():
         raise UnknownNameError("category", category, catalogue())
     entry = find(category)
-    index = model_number(entry, wanted, seed) if wanted else 0
+    index = model_number(entry, requested, seed) if requested else 0
     made = build_model(entry, index, seed).model
     with tempfile.TemporaryDirectory(prefix="ig2mj-model-") as root:
         write_models(pathlib.Path(root), {category: [index]}, seed)
@@ -243,17 +243,17 @@ def _convert_objects(
     return len(models)
 
 
-def _scenes_of(dataset: pathlib.Path, wanted: tuple[str, ...]) -> list[str]:
-    """Scenes of a dataset, all or the wanted ones. Raises InputError, UnknownNameError."""
+def _scenes_of(dataset: pathlib.Path, requested: tuple[str, ...]) -> list[str]:
+    """Scenes of a dataset, all or the requested ones. Raises InputError, UnknownNameError."""
     from ig2mj.errors import InputError, UnknownNameError
 
     found = sorted(folder.parent.name for folder in (dataset / "scenes").glob("*/urdf"))
     if not found:
         raise InputError(dataset, "holds no scenes/*/urdf", fix="give the folder that `ig2mj homes build` wrote")
-    for name in wanted:
+    for name in requested:
         if name not in found:
             raise UnknownNameError(f"home of {dataset}", name, found)
-    return list(wanted) or found
+    return list(requested) or found
 
 
 def list_(

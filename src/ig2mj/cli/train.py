@@ -277,7 +277,7 @@ def rendered_rows(rows: tuple[int, int] | None, size: int) -> tuple[int, int] | 
     return rows[0] * cell, rows[1] * cell
 
 
-def _devices(wanted: str, processes: int) -> list[Any]:
+def _devices(requested: str, processes: int) -> list[Any]:
     """Those of all processes that share the work, as many of each; none where there is only one.
 
     Raises:
@@ -287,13 +287,13 @@ def _devices(wanted: str, processes: int) -> list[Any]:
 
     from ig2mj.errors import Ig2mjError
 
-    if wanted == "1" and processes == 1:
+    if requested == "1" and processes == 1:
         return []
     every = jax.devices()
     least = min(sum(d.process_index == p for d in every) for p in range(processes))
-    each = least if wanted == "all" else int(wanted) // processes
-    if not 0 < each <= least or (wanted != "all" and int(wanted) % processes):
+    each = least if requested == "all" else int(requested) // processes
+    if not 0 < each <= least or (requested != "all" and int(requested) % processes):
         shares = f" in {processes} processes, and each takes as many" if processes > 1 else ""
-        raise Ig2mjError(f"--devices {wanted}: this run can have {len(every)}{shares}")
+        raise Ig2mjError(f"--devices {requested}: this run can have {len(every)}{shares}")
     by_process = [[d for d in every if d.process_index == p][:each] for p in range(processes)]
     return [device for own in by_process for device in own]

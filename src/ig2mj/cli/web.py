@@ -214,10 +214,10 @@ def _home(
 
     if pool is not None and set:
         raise Ig2mjError("--set cannot be combined with --pool")
-    wanted = None if goal is None else parse(goal, "--goal")
+    asked_goal = None if goal is None else parse(goal, "--goal")
     scene = load_home(name, objects) if pool is None else load_pool_scene(pool, name)
     rules = Rules.of_scene(scene)
-    compiled = None if wanted is None else rules.compiled(wanted)
+    compiled = None if asked_goal is None else rules.compiled(asked_goal)
     core = Core(make_engine(engine, scene, worlds), rules, None if pool is None else load_pool(pool, scene))
     if not set:
         return Home(scene, core, compiled)

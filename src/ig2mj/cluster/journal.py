@@ -107,10 +107,10 @@ class Journal:
 
     def _compare(self, file: pathlib.Path) -> None:
         known = read_json(file, kind=dict, fix=f"remove {self.folder}")
-        known, wanted = _flat(known), _flat(self._request)
-        for name in {**known, **wanted}:
-            if known.get(name) != wanted.get(name):
-                was, now = (json.dumps(r.get(name))[:80] for r in (known, wanted))
+        known, requested = _flat(known), _flat(self._request)
+        for name in {**known, **requested}:
+            if known.get(name) != requested.get(name):
+                was, now = (json.dumps(r.get(name))[:80] for r in (known, requested))
                 fix = f"to start over, remove {self.folder}"
                 problem = f"the interrupted run had {name} = {was}; this one has {now}"
                 raise InputError(self.out, problem, fix=fix)

@@ -177,13 +177,13 @@ def check_address(address: str) -> None:
     """
     import ray  # noqa: F401
 
-    wanted, what = address, "nobody answers there"
+    requested, what = address, "nobody answers there"
     if address == "auto":  # Ray waits for minutes for a cluster that ended without removing its record
-        wanted = _recorded()
-        if not wanted:
+        requested = _recorded()
+        if not requested:
             return
-        what = f"nobody answers at {wanted}, where this machine's last cluster was (`ray start` begins one)"
-    parsed = urllib.parse.urlsplit(wanted if "://" in wanted else f"//{wanted}")
+        what = f"nobody answers at {requested}, where this machine's last cluster was (`ray start` begins one)"
+    parsed = urllib.parse.urlsplit(requested if "://" in requested else f"//{requested}")
     try:
         host, port = parsed.hostname, parsed.port
     except ValueError:

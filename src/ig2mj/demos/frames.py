@@ -72,13 +72,13 @@ class FrameRows:
         self.own, self.batched = dict(zip(names, cuts, strict=False)), names[len(cuts) :]
 
     def __call__(self, state: EnvState) -> tuple[list[list[np.ndarray]], list[Any]]:
-        """Pieces of each wanted world, and arrays of all worlds; nobody changes them any more. Where a step uses up the
-        arrays of the one before, they are copied."""
+        """Pieces of each recorded world, and arrays of all worlds; nobody changes them any more. Where a step uses up
+        the arrays of the one before, they are copied."""
         own, batched = self._engine.frame(state.batch.world.physics, self._worlds)
         return own, [*batched, *self._engine.kept(jax.tree.leaves(_besides_physics(state)))]
 
     def rows(self, state: EnvState) -> list[list[np.ndarray]]:
-        """The same, as all arrays of each wanted world."""
+        """The same, as all arrays of each recorded world."""
         own, batched = self(state)
         arrays, found = [np.asarray(array) for array in batched], []
         for k, w in enumerate(self._worlds):

@@ -79,8 +79,8 @@ class Run:
         Raises:
           InputError: an array is missing, or is another than it must be.
         """
-        index, wanted = self.index(start, stop), like or [None] * len(names)
-        return [self._rows(f"frames/{name}", index, like) for name, like in zip(names, wanted, strict=True)]
+        index, requested = self.index(start, stop), like or [None] * len(names)
+        return [self._rows(f"frames/{name}", index, like) for name, like in zip(names, requested, strict=True)]
 
     def whole_frames(
         self, names: list[str], start: int, stop: int, like: list[Any], defaults: Mapping[str, np.ndarray]

@@ -158,13 +158,13 @@ class Replayer:
         Raises:
           InputError: an array of the file is broken.
         """
-        wanted = self.recording.runs if runs is None else runs
+        requested = self.recording.runs if runs is None else runs
         found: list[Difference] = []
         frames = 0
-        for now in self.rounds(wanted):
+        for now in self.rounds(requested):
             frames += sum(run.frames for run in now.values())
             found += self._by_action(now, check, watch) if self.by == "action" else self._by_state(now, watch)
-        return Replayed(sum(1 for r in wanted if r.frames), frames, found, self.warnings)
+        return Replayed(sum(1 for r in requested if r.frames), frames, found, self.warnings)
 
     def at(self, run: Run, frame: int, used: EnvState | None = None) -> EnvState:
         """The environment at a frame of a run as it was written; every world stands where that one did.
@@ -281,13 +281,13 @@ class Replayer:
             yield from rows
 
 
-def objects_again(recording: Recording, wanted: Any) -> tuple[str, ...]:
+def objects_again(recording: Recording, requested: Any) -> tuple[str, ...]:
     """What was added to the home, where it is now. Raises InputError: it is missing."""
-    if not isinstance(wanted, list) or not all(isinstance(text, str) for text in wanted):
+    if not isinstance(requested, list) or not all(isinstance(text, str) for text in requested):
         raise InputError(recording.file, "has objects that are no list of texts", element="attribute made_with")
     known = recording.value("additions_found_by", list)
     replaced = recording.value("replacements_found_by", list) if "replacements_found_by" in recording.header else []
-    return requests_again(wanted, [*replaced, *known[len(known) - len(added(wanted)) :]], recording.file)
+    return requests_again(requested, [*replaced, *known[len(known) - len(added(requested)) :]], recording.file)
 
 
 def recorded_observations(recording: Recording) -> tuple[str, ...]:

@@ -78,12 +78,12 @@ def replay_job(
         replayer = _replayer(file, by, tuple(sensors), threads, (shared or {}).get(RECORDING))
     except Ig2mjError as e:
         raise WholeRunError(e) from e
-    wanted = [run for run in replayer.recording.runs if run.name in set(runs)]
+    requested = [run for run in replayer.recording.runs if run.name in set(runs)]
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
         out = pathlib.Path(folder) / "part.h5"
         with h5py.File(out, "w") as opened:
             watcher = Observing(opened, sensors)
-            done = replayer(check, watcher.see if sensors else None, wanted)
+            done = replayer(check, watcher.see if sensors else None, requested)
             told = {"runs": done.runs, "frames": done.frames, "differences": [str(d) for d in done.differences]}
             opened.attrs[TOLD] = json.dumps({**told, "warnings": replayer.warnings})
         return out.read_bytes()

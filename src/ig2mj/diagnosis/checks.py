@@ -114,14 +114,14 @@ def machine_checks(nvidia: tuple[str, int] | None) -> list[Check]:
     return [*checks, Check("machine", "display", display is not None, display or "none", fix=fix)]
 
 
-def package_checks(wanted: Iterable[tuple[Requirement, str | None]]) -> list[Check]:
+def package_checks(requested: Iterable[tuple[Requirement, str | None]]) -> list[Check]:
     """Versions of required packages, and of each extra's packages, against what ig2mj asks for.
 
-    `wanted` as `ig2mj.install_hint.requirements` gives it.
+    `requested` as `ig2mj.install_hint.requirements` gives it.
     """
     base: list[Requirement] = []
     extras: dict[str, list[Requirement]] = {}
-    for requirement, extra in wanted:
+    for requirement, extra in requested:
         if extra is None:
             base.append(requirement)
         elif requirement.name != "ig2mj":  # an extra made of other extras

@@ -106,9 +106,9 @@ def check_written(fields: ModelFields | None, names: tuple[str, ...], model: muj
                 f"this engine has one {name} for all worlds (make it with model_fields=(..., '{name}'), a name of "
                 "ig2mj.engine.model_fields)"
             )
-        wanted = (worlds, *getattr(model, name).shape)
-        if tuple(np.shape(array)) != wanted:
-            raise EngineError(f"{name} has shape {tuple(np.shape(array))}, this engine takes {wanted}")
+        requested = (worlds, *getattr(model, name).shape)
+        if tuple(np.shape(array)) != requested:
+            raise EngineError(f"{name} has shape {tuple(np.shape(array))}, this engine takes {requested}")
     if 0 < len(found.keys() & set(MASSES)) < len(MASSES):
         raise EngineError("masses are written together: make them with ig2mj.engine.model_fields.with_masses")
 

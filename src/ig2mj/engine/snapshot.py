@@ -266,8 +266,8 @@ def fitted(snapshot: Snapshot, start: Snapshot, num_worlds: int, scene: str) -> 
     for part, names in _PARTS.items():
         given_part, own_part = getattr(snapshot, part), getattr(start, part)
         for name in names:
-            found, wanted = getattr(given_part, name).shape[len(batch) :], getattr(own_part, name).shape
-            if tuple(found) != tuple(wanted):
+            found, requested = getattr(given_part, name).shape[len(batch) :], getattr(own_part, name).shape
+            if tuple(found) != tuple(requested):
                 fix = (
                     "load it into the scene that it was saved from"
                     if part == "scene"
@@ -275,7 +275,7 @@ def fitted(snapshot: Snapshot, start: Snapshot, num_worlds: int, scene: str) -> 
                 )
                 raise EngineError(
                     f"the snapshot does not fit scene '{scene}': {name} of its {part} has shape {tuple(found)}, "
-                    f"the scene's {tuple(wanted)} ({fix})"
+                    f"the scene's {tuple(requested)} ({fix})"
                 )
     fields = _fitted_fields(snapshot.model_fields, start.model_fields, batch)
     return snapshot if fields is snapshot.model_fields else dataclasses.replace(snapshot, model_fields=fields)
@@ -288,15 +288,15 @@ _PARTS = {
 
 
 def _fitted_fields(fields: ModelFields, start: ModelFields, batch: tuple[int, ...]) -> ModelFields:
-    found, wanted = given(fields), given(start)
+    found, requested = given(fields), given(start)
     for name, array in found.items():
-        if name not in wanted:
+        if name not in requested:
             raise EngineError(
                 f"the snapshot has a {name} of its own (make the engine with model_fields=(..., '{name}'))"
             )
-        if tuple(array.shape) != (*batch, *wanted[name].shape):
+        if tuple(array.shape) != (*batch, *requested[name].shape):
             raise EngineError(f"the snapshot does not fit: its {name} has shape {tuple(array.shape)}")
-    missing = {n: np.broadcast_to(a, (*batch, *a.shape)) for n, a in wanted.items() if n not in found}
+    missing = {n: np.broadcast_to(a, (*batch, *a.shape)) for n, a in requested.items() if n not in found}
     return dataclasses.replace(fields, **missing) if missing else fields
 
 

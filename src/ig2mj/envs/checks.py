@@ -37,9 +37,9 @@ def checked_action(env: Environment, action: Array) -> Float[Array, "W n"]:
     if isinstance(action, Tracer):
         outside = "the native engine steps outside of compiled programs: call step without jit, vmap or scan"
         check_pure(env.core.engine, ActionError(outside))
-    wanted = (env.num_worlds, *env.action_space.shape)
-    if np.shape(action) != wanted:
-        raise ActionError(f"an action of {env.task.name} has shape {wanted}, not {np.shape(action)}")
+    requested = (env.num_worlds, *env.action_space.shape)
+    if np.shape(action) != requested:
+        raise ActionError(f"an action of {env.task.name} has shape {requested}, not {np.shape(action)}")
     if not isinstance(action, jax.Array):
         action = np.asarray(action)
     if not (jnp.issubdtype(action.dtype, jnp.floating) or jnp.issubdtype(action.dtype, jnp.integer)):

@@ -37,7 +37,7 @@ _END, _END64, _LOCATOR64 = b"PK\5\6", b"PK\6\6", b"PK\6\7"
 
 def read_npz(
     file: str | os.PathLike | bytes,
-    wanted: Callable[[str], bool] = lambda name: True,
+    requested: Callable[[str], bool] = lambda name: True,
     *,
     named: object = None,
     fix: str = "",
@@ -46,7 +46,7 @@ def read_npz(
 
     Args:
       file: a path, or an archive's bytes.
-      wanted: says of a name whether that array is read.
+      requested: says of a name whether that array is read.
       named: what errors name instead of the path.
 
     Raises:
@@ -58,7 +58,7 @@ def read_npz(
         with io.BytesIO(file) if isinstance(file, bytes) else pathlib.Path(file).open("rb") as stream:
             _check_directory(stream, size, said)
             with zipfile.ZipFile(stream) as archive:
-                entries = [e for e in _entries(archive, said) if wanted(e.filename.removesuffix(".npy"))]
+                entries = [e for e in _entries(archive, said) if requested(e.filename.removesuffix(".npy"))]
                 refuse_bomb(sum(e.file_size for e in entries), size, said)
                 return {e.filename.removesuffix(".npy"): _read(archive, e, said) for e in entries}
     except InputError as e:

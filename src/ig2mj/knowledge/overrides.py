@@ -62,8 +62,8 @@ def check_parameters(file: pathlib.Path, element: str, ability: str, parameters:
             have = ", ".join(known) or "none"
             raise InputError(file, f"has no parameter '{name}'", element=element, fix=f"its parameters: {have}")
         if isinstance(value, bool) != isinstance(known[name], bool):
-            wanted = "true or false" if isinstance(known[name], bool) else "a number"
-            raise InputError(file, f"parameter '{name}' is {value!r}", element=element, fix=f"give {wanted}")
+            requested = "true or false" if isinstance(known[name], bool) else "a number"
+            raise InputError(file, f"parameter '{name}' is {value!r}", element=element, fix=f"give {requested}")
 
 
 @functools.cache

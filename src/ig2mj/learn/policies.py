@@ -68,10 +68,10 @@ def objects_on_card(env: Any) -> dict[str, Any]:
     config = getattr(env, "config", None)
     if config is None or not config.objects:
         return {}
-    wanted = list(object_texts(config.objects))
+    requested = list(object_texts(config.objects))
     additions = env.scene.additions
-    own = additions[len(additions) - len(added(wanted)) :]
-    return {"objects": wanted, "objects_found_by": entries_of((*env.scene.replacements, *own))}
+    own = additions[len(additions) - len(added(requested)) :]
+    return {"objects": requested, "objects_found_by": entries_of((*env.scene.replacements, *own))}
 
 
 def objects_of(policy: Policy, file: object) -> tuple[str, ...]:
@@ -80,8 +80,8 @@ def objects_of(policy: Policy, file: object) -> tuple[str, ...]:
     Raises:
       InputError: it is missing; names `file`.
     """
-    wanted = policy.card.get("objects", [])
-    return requests_again(wanted, policy.card.get("objects_found_by", []), str(file)) if wanted else ()
+    requested = policy.card.get("objects", [])
+    return requests_again(requested, policy.card.get("objects_found_by", []), str(file)) if requested else ()
 
 
 def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, Any]:

@@ -39,16 +39,16 @@ def register(
     Raises:
       PluginError: one is not what is expected, or a name is taken.
     """
-    wanted: list[tuple[str, str, Any]] = []
+    requested: list[tuple[str, str, Any]] = []
     for kind, things in (("state", states), ("predicate", predicates), ("sensor", sensors)):
-        wanted += [(kind, getattr(thing, "name", "?"), thing) for thing in things]
+        requested += [(kind, getattr(thing, "name", "?"), thing) for thing in things]
     for kind, named in (("robot", robots), ("command", commands), ("overlay", overlays)):
-        wanted += [(kind, name, thing) for name, thing in (named or {}).items()]
+        requested += [(kind, name, thing) for name, thing in (named or {}).items()]
     source = source_of_caller()
-    registries = {kind: registry_of(kind) for kind, _, _ in wanted}
+    registries = {kind: registry_of(kind) for kind, _, _ in requested}
     before = {kind: found.registered() for kind, found in registries.items()}
     try:
-        for kind, name, thing in wanted:
+        for kind, name, thing in requested:
             registries[kind].add(name, thing, source, replace)
     except PluginError:
         for kind, found in registries.items():

@@ -29,7 +29,7 @@ BRANCHES = 400
 
 
 class _Choice(NamedTuple):
-    """A reading of a part. `cost`: of its literals, each use of one. `clash`: an atom that is wanted both true and
+    """A reading of a part. `cost`: of its literals, each use of one. `clash`: an atom that must be both true and
     false, so that the cost is a lower bound."""
 
     cost: float
@@ -50,7 +50,7 @@ def compatible(reading: Reading) -> Collection[Atom]:
 
 
 def cheapest(
-    expression: Expression, cost: Cost, wanted: bool = True, incompatible: Incompatible = compatible
+    expression: Expression, cost: Cost, expected: bool = True, incompatible: Incompatible = compatible
 ) -> tuple[float, Reading]:
     """The reading of least cost, and that cost; infinite, with the reading of what fits, where there is none.
 
@@ -58,7 +58,7 @@ def cheapest(
       expression: ground. cost: of literals; may be negative. Each use of a literal counts.
       incompatible: what cannot be together, though each can be.
     """
-    first = _choice(expression, cost, wanted)
+    first = _choice(expression, cost, expected)
     numbers = itertools.count()
     queue: list[tuple[float, int, dict[Atom, bool], _Choice]] = [(first.cost, next(numbers), {}, first)]
     for _ in range(BRANCHES):
@@ -73,7 +73,7 @@ def cheapest(
                 return value, found.reading
         for branch in branches:
             own = {**settled, **branch}
-            choice = _choice(expression, _given(cost, own), wanted)
+            choice = _choice(expression, _given(cost, own), expected)
             heapq.heappush(queue, (choice.cost, next(numbers), own, choice))
     return math.inf, first.reading
 
@@ -85,27 +85,27 @@ def contradiction(expression: Expression, cost: Cost) -> Atom | None:
 
 def _given(cost: Cost, settled: Reading) -> Cost:
     """`cost`, where the truth of some atoms is settled."""
-    return lambda atom, wanted: math.inf if settled.get(atom, wanted) != wanted else cost(atom, wanted)
+    return lambda atom, expected: math.inf if settled.get(atom, expected) != expected else cost(atom, expected)
 
 
-def _choice(expression: Expression, cost: Cost, wanted: bool) -> _Choice:
+def _choice(expression: Expression, cost: Cost, expected: bool) -> _Choice:
     """The choice of least cost, where contradictions between parts cost nothing."""
     match expression:
         case Atom():
-            return _Choice(cost(expression, wanted), {expression: wanted})
+            return _Choice(cost(expression, expected), {expression: expected})
         case Not(part):
-            return _choice(part, cost, not wanted)
+            return _choice(part, cost, not expected)
         case And(parts) | Or(parts):
-            found = [_choice(p, cost, wanted) for p in parts]
-            if isinstance(expression, And) == wanted:
+            found = [_choice(p, cost, expected) for p in parts]
+            if isinstance(expression, And) == expected:
                 return _together(found)
             return _least(found)
         case Exactly(count, parts):
-            if wanted:
+            if expected:
                 return _exactly(count, parts, cost)
             return _least([_exactly(n, parts, cost) for n in range(len(parts) + 1) if n != count])
         case Pairing(count, rows):
-            return _paired(count, rows, cost) if wanted else _unpaired(count, rows, cost)
+            return _paired(count, rows, cost) if expected else _unpaired(count, rows, cost)
     raise TypeError(f"{expression!r} is not a ground expression")
 
 
@@ -158,5 +158,5 @@ def _paired(count: int, rows: Sequence[Sequence[Expression | None]], cost: Cost)
 def _unpaired(count: int, rows: Sequence[Sequence[Expression | None]], cost: Cost) -> _Choice:
     """So many rows without a true part that fewer than `count` are left."""
     empty = [_together([_choice(p, cost, False) for p in row if p is not None]) for row in rows]
-    wanted = max(len(rows) - count + 1, 0)
-    return _together(sorted(empty, key=lambda choice: choice.cost)[:wanted])
+    expected = max(len(rows) - count + 1, 0)
+    return _together(sorted(empty, key=lambda choice: choice.cost)[:expected])

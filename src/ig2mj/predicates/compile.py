@@ -177,9 +177,9 @@ def group_members(model: StateModel, name: str, groups: Groups) -> list[str]:
     if name in groups:
         return list(groups[name])
     tables = model.tables
-    wanted = {name} if name in tables.object_categories else _categories(name)
+    expected = {name} if name in tables.object_categories else _categories(name)
     rows = zip(tables.object_names, tables.object_categories, tables.object_part_of, strict=True)
-    found = [n for n, category, whole in rows if category in wanted and whole < 0]
+    found = [n for n, category, whole in rows if category in expected and whole < 0]
     if not found:
         raise UnknownNameError("group of objects", name, {*groups, *tables.object_categories})
     return found

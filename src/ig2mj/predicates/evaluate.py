@@ -79,47 +79,47 @@ def fraction(e: Expression, truth: Truth) -> Float[Array, "W"]:
     return _score(e, truth, True).value
 
 
-def _score(e: Expression, truth: Truth, wanted: bool) -> Score:
+def _score(e: Expression, truth: Truth, expected: bool) -> Score:
     match e:
         case Atom():
-            return Score((holds(e, truth) == wanted).astype(np.float32), 1.0)
+            return Score((holds(e, truth) == expected).astype(np.float32), 1.0)
         case Not(part):
-            return _score(part, truth, not wanted)
+            return _score(part, truth, not expected)
         case And(parts) | Or(parts):
-            return (_mean if isinstance(e, And) == wanted else _best)(parts, truth, wanted)
+            return (_mean if isinstance(e, And) == expected else _best)(parts, truth, expected)
         case Exactly(count, parts):
             near = truth.xp.stack(
                 [_score(p, truth, True).value for p in parts] or [truth.xp.zeros(truth.worlds, np.float32)]
             )
             extra = truth.xp.maximum(truth.xp.sum(near >= 1.0, axis=0) - count, 0)
             share = (_sum_of_best(near, count) - extra) / max(count, len(parts), 1)
-            return _quantified(holds(e, truth), share, count, wanted)
+            return _quantified(holds(e, truth), share, count, expected)
         case Pairing(count, rows):
             grid = _grid(rows, lambda p: _score(p, truth, True).value, truth)
             sides = [_sum_of_best(truth.xp.max(grid, axis=axis, initial=0.0), count) for axis in (0, 1)]
-            return _quantified(holds(e, truth), truth.xp.minimum(*sides) / max(count, 1), count, wanted)
+            return _quantified(holds(e, truth), truth.xp.minimum(*sides) / max(count, 1), count, expected)
     raise TypeError(f"{e!r} is not a ground expression")
 
 
-def _mean(parts: Sequence[Expression], truth: Truth, wanted: bool) -> Score:
+def _mean(parts: Sequence[Expression], truth: Truth, expected: bool) -> Score:
     plain, rest = _literals(parts)
-    others = [_score(p, truth, wanted) for p in rest]
+    others = [_score(p, truth, expected) for p in rest]
     total = float(len(plain) + sum(s.weight for s in others))
     if not total:
         return Score(truth.xp.ones(truth.worlds, np.float32), 0.0)
     values = [s.weight * s.value for s in others]
     if plain:
-        values.append(truth.xp.sum(_literal_values(plain, truth) == wanted, axis=-1).astype(np.float32))
+        values.append(truth.xp.sum(_literal_values(plain, truth) == expected, axis=-1).astype(np.float32))
     value = functools.reduce(operator.add, values)
     return Score(value / total, total)
 
 
-def _best(parts: Sequence[Expression], truth: Truth, wanted: bool) -> Score:
+def _best(parts: Sequence[Expression], truth: Truth, expected: bool) -> Score:
     plain, rest = _literals(parts)
-    others = [_score(p, truth, wanted) for p in rest]
+    others = [_score(p, truth, expected) for p in rest]
     values = [s.value for s in others]
     if plain:
-        values.append(truth.xp.any(_literal_values(plain, truth) == wanted, axis=-1).astype(np.float32))
+        values.append(truth.xp.any(_literal_values(plain, truth) == expected, axis=-1).astype(np.float32))
     if not values:
         return Score(truth.xp.zeros(truth.worlds, np.float32), 1.0)
     return Score(truth.xp.max(truth.xp.stack(values), axis=0), max([1.0, *(s.weight for s in others)]))
@@ -133,10 +133,10 @@ def _sum_of_best(values: Float[Array, "N W"], count: int) -> Float[Array, "W"]:
     return xp.sum(xp.where(xp.sum(better, axis=0) < count, values, xp.zeros_like(values)), axis=0)
 
 
-def _quantified(true: Bool[Array, "W"], share: Float[Array, "W"], count: int, wanted: bool) -> Score:
+def _quantified(true: Bool[Array, "W"], share: Float[Array, "W"], count: int, expected: bool) -> Score:
     xp = true.__array_namespace__()
-    share = xp.clip(share, 0.0, LESS_THAN_ONE) if wanted else xp.zeros_like(share)
-    return Score(xp.where(true == wanted, 1.0, share), float(max(count, 1)))
+    share = xp.clip(share, 0.0, LESS_THAN_ONE) if expected else xp.zeros_like(share)
+    return Score(xp.where(true == expected, 1.0, share), float(max(count, 1)))
 
 
 def _each(parts: Sequence[Expression], truth: Truth) -> Bool[Array, "W N"]:

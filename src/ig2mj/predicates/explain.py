@@ -82,32 +82,32 @@ def pairs_found(rows, table: dict[Atom, bool]) -> tuple[int, int]:
     return sum(any(row) for row in grid), sum(any(column) for column in zip(*grid, strict=True))
 
 
-def _missing(e: Expression, table: dict[Atom, bool], wanted: bool, reason, lines: list[str], indent: str) -> None:
+def _missing(e: Expression, table: dict[Atom, bool], expected: bool, reason, lines: list[str], indent: str) -> None:
     """Adds lines about `e`, whose truth is not the desired one."""
-    if value_of(e, table) == wanted:
+    if value_of(e, table) == expected:
         return
     match e:
         case Atom():
             why = reason(e)
-            lines.append(f"{indent}{'' if wanted else 'not '}{logic.text(e)}" + (f": {why}" if why else ""))
+            lines.append(f"{indent}{'' if expected else 'not '}{logic.text(e)}" + (f": {why}" if why else ""))
         case Not(part):
-            _missing(part, table, not wanted, reason, lines, indent)
+            _missing(part, table, not expected, reason, lines, indent)
         case And(parts) | Or(parts):
-            every = isinstance(e, And) == wanted
+            every = isinstance(e, And) == expected
             if not every and len(parts) > 1:
                 lines.append(f"{indent}one of:")
                 indent += "  "
             if not parts:
                 lines.append(f"{indent}nothing can make an empty alternative true")
             for p in parts:
-                _missing(p, table, wanted, reason, lines, indent)
+                _missing(p, table, expected, reason, lines, indent)
         case Exactly(count, parts):
             found = sum(value_of(p, table) for p in parts)
-            lines.append(f"{indent}{'' if wanted else 'not '}exactly {count} of {len(parts)} (now {found}):")
+            lines.append(f"{indent}{'' if expected else 'not '}exactly {count} of {len(parts)} (now {found}):")
             for p in parts:
                 _missing(p, table, found < count, reason, lines, indent + "  ")
         case Pairing(count, rows):
             found = min(pairs_found(rows, table))
-            lines.append(f"{indent}{'' if wanted else 'not '}{count} pairs (now {found}):")
+            lines.append(f"{indent}{'' if expected else 'not '}{count} pairs (now {found}):")
             for p in (p for row in rows for p in row if p is not None):
-                _missing(p, table, wanted, reason, lines, indent + "  ")
+                _missing(p, table, expected, reason, lines, indent + "  ")

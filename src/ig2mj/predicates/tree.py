@@ -21,13 +21,13 @@ class Part:
 
     Attributes:
       text: the literal, or what its parts have to do ("all of", "one of"). literal: it has no parts.
-      holds: its truth. wanted: the truth that would make the whole hold. why: numbers behind a literal that does not
+      holds: its truth. expected: the truth that would make the whole hold. why: numbers behind a literal that does not
       have it, else "". parts: of which it consists.
     """
 
     text: str
     holds: bool
-    wanted: bool
+    expected: bool
     literal: bool = False
     why: str = ""
     parts: tuple[Part, ...] = ()
@@ -35,7 +35,7 @@ class Part:
     @property
     def fine(self) -> bool:
         """It is as it should be."""
-        return self.holds == self.wanted
+        return self.holds == self.expected
 
 
 def tree(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int = 0) -> Part:
@@ -43,27 +43,27 @@ def tree(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView
     context, table = truth_in(compiled, states, view, world)
     reason = reason_of(compiled, context)
 
-    def part(e: Expression, wanted: bool) -> Part:
+    def part(e: Expression, expected: bool) -> Part:
         holds = value_of(e, table)
         match e:
             case Atom():
-                why = reason(e) if holds != wanted else ""
-                return Part(logic.text(e), holds, wanted, True, why)
+                why = reason(e) if holds != expected else ""
+                return Part(logic.text(e), holds, expected, True, why)
             case Not(Atom() as inner):
-                inside = part(inner, not wanted)
-                return Part(f"not {inside.text}", holds, wanted, True, inside.why)
+                inside = part(inner, not expected)
+                return Part(f"not {inside.text}", holds, expected, True, inside.why)
             case Not(inner):
-                return Part("not", holds, wanted, parts=(part(inner, not wanted),))
+                return Part("not", holds, expected, parts=(part(inner, not expected),))
             case And(parts) | Or(parts):
                 name = "all of" if isinstance(e, And) else "one of"
-                return Part(name, holds, wanted, parts=tuple(part(p, wanted) for p in parts))
+                return Part(name, holds, expected, parts=tuple(part(p, expected) for p in parts))
             case Exactly(count, parts):
                 found = sum(value_of(p, table) for p in parts)
                 name = f"exactly {count} of {len(parts)}, now {found}"
-                return Part(name, holds, wanted, parts=tuple(part(p, found <= count) for p in parts))
+                return Part(name, holds, expected, parts=tuple(part(p, found <= count) for p in parts))
             case Pairing(count, rows):
-                inner = tuple(part(p, wanted) for row in rows for p in row if p is not None)
-                return Part(f"{count} pairs, now {min(pairs_found(rows, table))}", holds, wanted, parts=inner)
+                inner = tuple(part(p, expected) for row in rows for p in row if p is not None)
+                return Part(f"{count} pairs, now {min(pairs_found(rows, table))}", holds, expected, parts=inner)
         raise TypeError(f"{e!r} is not a ground expression")
 
     return part(compiled.ground, True)

@@ -96,10 +96,10 @@ def sample(
       StateError, AbilityError, UnknownNameError, ExpressionError: a condition can never be made true.
       EngineError: the scene itself does not come to rest. ClusterError: see `ig2mj.cluster.job_runner.map_jobs`.
     """
-    wanted = read_conditions(conditions)
-    bind(wanted, scene.tables, np.random.default_rng(0))  # errors before any work
+    asked = read_conditions(conditions)
+    bind(asked, scene.tables, np.random.default_rng(0))  # errors before any work
 
-    work = row_jobs(scene, wanted, range(first, first + count), seed, seconds_per_row)
+    work = row_jobs(scene, asked, range(first, first + count), seed, seconds_per_row)
     return sampled_rows(scene, work, first, where or Where(jobs), journal, progress)
 
 
@@ -153,12 +153,12 @@ def packed_row(row: Row | None, rejected: Mapping[str, int]) -> bytes:
 
 
 def row_jobs(
-    scene: Scene, wanted: Sequence[Condition], numbers: Sequence[int], seed: int, seconds: float = math.inf
+    scene: Scene, asked: Sequence[Condition], numbers: Sequence[int], seed: int, seconds: float = math.inf
 ) -> JobSet:
     """Jobs that sample one row each."""
     common = {
         **named(scene),
-        "conditions": [[c.predicate, list(c.arguments), c.value] for c in wanted],
+        "conditions": [[c.predicate, list(c.arguments), c.value] for c in asked],
         "seed": seed,
         "seconds": None if math.isinf(seconds) else seconds,
     }
@@ -175,13 +175,13 @@ def row_job(
     scene: str, objects: Sequence[str], conditions: Sequence[Sequence], seed: int, seconds: float | None, number: int
 ) -> bytes:
     """One row, packed, with the reasons why candidates were turned down; no arrays where it was given up."""
-    wanted = [Condition(predicate, tuple(arguments), value) for predicate, arguments, value in conditions]
+    asked = [Condition(predicate, tuple(arguments), value) for predicate, arguments, value in conditions]
     with jax.default_device(jax.local_devices(backend="cpu")[0]):  # one world, and the same rows with and without a GPU
         try:
             sampler = _sampler(scene, tuple(objects))
         except EngineError as e:
             raise WholeRunError(e) from e
-        row, rejected = sample_row(sampler, wanted, seed, number, math.inf if seconds is None else seconds)
+        row, rejected = sample_row(sampler, asked, seed, number, math.inf if seconds is None else seconds)
     return packed_row(row, rejected)
 
 
@@ -203,14 +203,14 @@ def make_sampler(scene: Scene) -> RowSampler:
 
 
 def sample_row(
-    sampler: RowSampler, wanted: Sequence[Condition], seed: int, number: int, seconds: float = float("inf")
+    sampler: RowSampler, asked: Sequence[Condition], seed: int, number: int, seconds: float = float("inf")
 ) -> tuple[Row | None, Rejections]:
     """One row by its number, and the reasons why candidates were turned down."""
     rejected: Rejections = collections.Counter()
     end = time.monotonic() + seconds
     for attempt in range(ATTEMPTS):
         rng = np.random.default_rng([seed, number, attempt])
-        bound = bind(wanted, sampler.model.tables, rng)
+        bound = bind(asked, sampler.model.tables, rng)
         row = sampler.sample(bound, rng, Budget(ROW_BUDGET, end - time.monotonic()), rejected)
         if row is not None:
             return row, rejected

@@ -295,7 +295,7 @@ class Placer:
             every = every[self._over(shape, cells, area.supports).ravel()[every]]
         many = MANY_CELLS // max(int(shape.covered.sum()), 1)
         few = len(every) <= RANDOM_CELLS
-        wanted = "balanced" if support == "loose" and not area.loose else support
+        requested = "balanced" if support == "loose" and not area.loose else support
         supports = area.supports if support == "full" else (*area.supports, *area.contents)
         rest, good = _none(), np.zeros(0, bool)
         for first in (True, False):
@@ -304,13 +304,13 @@ class Placer:
             else:
                 chosen = every
                 if len(chosen) > many:
-                    possible = possible_origins(level, shape, supports, cells.rows, cells.cols, wanted == "full")
+                    possible = possible_origins(level, shape, supports, cells.rows, cells.cols, requested == "full")
                     chosen = chosen[possible.ravel()[chosen]]
                 if len(chosen) > many:
                     chosen = rng.choice(chosen, many, replace=False)
             row, col = cells.row + chosen // cells.cols, cells.col + chosen % cells.cols
-            rest = rest_at(level, shape, row, col, supports, wanted)
-            good = {"full": rest.full, "balanced": rest.balanced, "loose": rest.clear}[wanted]
+            rest = rest_at(level, shape, row, col, supports, requested)
+            good = {"full": rest.full, "balanced": rest.balanced, "loose": rest.clear}[requested]
             if good.any() or few:
                 break
         if not good.any():

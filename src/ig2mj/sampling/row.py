@@ -114,7 +114,7 @@ class RowSampler:
         self._states, self._keep, self._again = self._initial, keep, frozenset(again)
         self._around = tuple(around)
         self._others = Bystanders(self.query, self._start)
-        placed = {name for name, wanted in plan.placements if wanted[0].value}
+        placed = {name for name, requested in plan.placements if requested[0].value}
         self._joints = [c for c in plan.joints if c.arguments[0] in placed]
         for condition in plan.joints:
             if condition not in self._joints and not self._open(condition, rng, rejected):
@@ -161,13 +161,13 @@ class RowSampler:
         while k < len(placements):
             if budget.spent():
                 return False
-            name, wanted = placements[k]
+            name, requested = placements[k]
             self._placed = placements[:k] if self._keep else ()
             before.append(self.query.save())
             part = budget if len(placements) == 1 else budget.part(SHARE)
             left = part.work
             reasons: Rejections = collections.Counter()
-            placed = self._place(name, wanted, rng, part, reasons)
+            placed = self._place(name, requested, rng, part, reasons)
             if part is not budget:
                 budget.work -= left - part.work + 1
             if placed:
@@ -184,20 +184,25 @@ class RowSampler:
         return True
 
     def _place(
-        self, name: str, wanted: tuple[Condition, ...], rng: np.random.Generator, budget: Budget, rejected: Rejections
+        self,
+        name: str,
+        requested: tuple[Condition, ...],
+        rng: np.random.Generator,
+        budget: Budget,
+        rejected: Rejections,
     ) -> bool:
         """Places one object, if it is not where it shall be already and negations are all that is asked."""
         index = object_index(self.model, name)
-        rule = wanted[0]
-        if self._keep and name not in self._again and self._holds(wanted):
+        rule = requested[0]
+        if self._keep and name not in self._again and self._holds(requested):
             return True
         if self.model.tables.object_fixed[index]:
-            if self._holds(wanted):
+            if self._holds(requested):
                 return True
             raise StateError(f"'{name}' is fixed: it cannot be moved so that {rule} becomes true")
-        if not rule.value and self._holds(wanted):
+        if not rule.value and self._holds(requested):
             return True
-        areas = self._areas(name, wanted)
+        areas = self._areas(name, requested)
         before = self.query.save()
         along = -1
         if rule.value and rule.predicate != "on_floor":
@@ -208,7 +213,7 @@ class RowSampler:
         done = self._placer.place(
             index,
             areas,
-            lambda: self._holds(wanted) and (not earlier or self._holds(earlier)),
+            lambda: self._holds(requested) and (not earlier or self._holds(earlier)),
             rng,
             budget,
             rejected,
@@ -219,7 +224,7 @@ class RowSampler:
         if not done:
             return False
         opened = [c for c in self._joints if c.arguments[0] == name]
-        if all(self._open(c, rng, rejected) for c in opened) and (not opened or self._holds(wanted)):
+        if all(self._open(c, rng, rejected) for c in opened) and (not opened or self._holds(requested)):
             return True
         self.query.load(before)
         return False
@@ -245,10 +250,10 @@ class RowSampler:
             self.query.load(mover.before)
         return False
 
-    def _areas(self, name: str, wanted: Sequence[Condition]) -> Areas:
+    def _areas(self, name: str, requested: Sequence[Condition]) -> Areas:
         """Where an object may be put: what the first condition proposes, narrowed by the others."""
         index = object_index(self.model, name)
-        rule, others = _proposing(wanted)
+        rule, others = _proposing(requested)
         if rule.predicate == "on_floor":
             second = room_index(self.model, rule.arguments[1])
         else:
@@ -266,7 +271,7 @@ class RowSampler:
             elif rule.predicate == "next_to" and other.predicate in ("inside", "on_top"):
                 bearer = object_index(self.model, other.arguments[1])
                 areas = borne_by(areas, self.query, bearer, loose=other.predicate == "inside")
-        if rule.predicate == "next_to" and all(c.predicate in WITHOUT_CONTACT for c in wanted):
+        if rule.predicate == "next_to" and all(c.predicate in WITHOUT_CONTACT for c in requested):
             return holding_at_once(areas)
         return areas
 
@@ -305,11 +310,11 @@ class RowSampler:
         return ""
 
 
-def _proposing(wanted: Sequence[Condition]) -> tuple[Condition, list[Condition]]:
+def _proposing(requested: Sequence[Condition]) -> tuple[Condition, list[Condition]]:
     """The condition that proposes places, and those that narrow them: a neighbour says most precisely where."""
-    if not wanted[0].value:
-        return wanted[0], []
-    needed = [c for c in wanted if c.value]
+    if not requested[0].value:
+        return requested[0], []
+    needed = [c for c in requested if c.value]
     inner = any(c.predicate in ("inside", "on_top") for c in needed)
     rule = next((c for c in needed if inner and c.predicate == "next_to"), needed[0])
     return rule, [c for c in needed if c is not rule]

@@ -18,22 +18,22 @@ SEEDS = 5
 """Seeds that are tried before there is no place for them."""
 
 
-def sample_places(scene: Scene, wanted: Sequence[tuple[str, str, str]]) -> dict[str, Pose]:
+def sample_places(scene: Scene, requested: Sequence[tuple[str, str, str]]) -> dict[str, Pose]:
     """Poses of objects' frames, at rest, by name; the same ones in every run.
 
     Args:
-      scene: without agents; the objects are outside the house. wanted: object, predicate ("on_top"), object or room.
+      scene: without agents; the objects are outside the house. requested: object, predicate ("on_top"), object or room.
 
     Raises:
       UnknownNameError: no such predicate, object or room. StateError, AbilityError: it can never hold, or was not
         found to.
     """
-    for name, predicate, target in wanted:
+    for name, predicate, target in requested:
         if predicate not in PLACEMENTS:
             raise UnknownNameError(f"predicate that places '{name}'", predicate, PLACEMENTS)
         if name == target:
             raise StateError(f"'{name}' cannot be placed {predicate} itself")
-    conditions = [f"({predicate} {name} {target})" for name, predicate, target in wanted]
+    conditions = [f"({predicate} {name} {target})" for name, predicate, target in requested]
     reasons = ""
     for seed in range(SEEDS):
         found = sample(scene, conditions, 1, seed)
@@ -41,7 +41,7 @@ def sample_places(scene: Scene, wanted: Sequence[tuple[str, str, str]]) -> dict[
             data = scene.start_data()
             data.qpos[: scene.model.nq] = np.asarray(found.pool.physics.whole("qpos"))[0][: scene.model.nq]
             mujoco.mj_kinematics(scene.model, data)
-            return {name: _pose(scene, data, name) for name, _, _ in wanted}
+            return {name: _pose(scene, data, name) for name, _, _ in requested}
         reasons = ", ".join(f"{reason} ({count})" for reason, count in found.rejected.most_common(3))
     raise StateError(f"found no place where {' and '.join(conditions)}: {reasons}")
 

@@ -25,7 +25,7 @@ TOP = np.cos(np.deg2rad(45.0))
 """The same of floors."""
 
 TRIES = 40
-"""Points drawn for each particle wanted."""
+"""Points drawn for each requested particle."""
 
 
 @dataclasses.dataclass(frozen=True)

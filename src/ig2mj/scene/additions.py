@@ -67,7 +67,7 @@ class Addition:
         return self.folder if self.named and self.folder else f"{self.category}/{self.model}"
 
     @property
-    def wanted(self) -> str:
+    def requested(self) -> str:
         """What `load_scene(objects=...)` takes for it."""
         if self.start is not None:
             return f"{self.reference}@loose:{_numbers(self.start, ',')}"
@@ -81,13 +81,13 @@ class Addition:
         return find_model(self.reference if self.named else LibraryName(self.reference))
 
 
-def name_additions(taken: Iterable[str], wanted: Sequence[str]) -> list[tuple[str, LibraryModel]]:
-    """The names that `wanted` get ("apple", "apple/apple_00" or a folder) in a scene whose objects are named `taken`.
+def name_additions(taken: Iterable[str], requested: Sequence[str]) -> list[tuple[str, LibraryModel]]:
+    """The names that `requested` get ("apple", "apple/apple_00" or a folder) in a scene whose objects are `taken`.
 
     Raises:
       UnknownNameError: the library has no such category or model. Ig2mjError: a place is none.
     """
-    return name_models(taken, [find_model(read_request(name).reference) for name in wanted])
+    return name_models(taken, [find_model(read_request(name).reference) for name in requested])
 
 
 def name_models(taken: Iterable[str], models: Sequence[LibraryModel]) -> list[tuple[str, LibraryModel]]:

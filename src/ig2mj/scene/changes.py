@@ -59,13 +59,13 @@ class Change:
         return Change(self.name, model.reference if model.named else self.instead)
 
 
-def read_change(wanted: object) -> Change | None:
+def read_change(requested: object) -> Change | None:
     """The change that a value of `objects` is: "remove:NAME", "replace:NAME=MODEL"; None: it is an object to add.
 
     Raises:
       Ig2mjError: a name is missing.
     """
-    text = os.fspath(wanted) if isinstance(wanted, str | os.PathLike) else ""
+    text = os.fspath(requested) if isinstance(requested, str | os.PathLike) else ""
     match = _CHANGE.fullmatch(text)
     if match is None or folder_of(text) is not None:
         return None
@@ -91,9 +91,9 @@ def changes_of(remove: str | Iterable[str] = (), replace: Mapping[str, str | os.
     return [Change(name, instead).text for name, instead in pairs]
 
 
-def added(wanted: Iterable[object]) -> list:
+def added(requested: Iterable[object]) -> list:
     """Of values of `objects` those that are objects to add, and neither changes nor substances."""
-    return [text for text in wanted if read_change(text) is None and not is_substances(text)]
+    return [text for text in requested if read_change(text) is None and not is_substances(text)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -277,7 +277,7 @@ def _remove(root: ElementTree.Element, entries: Sequence[ObjectEntry]) -> None:
     """Removes bodies, and what refers to anything in them."""
     world = root.find("worldbody")
     assert world is not None
-    wanted = {body for entry in entries for body in entry.bodies}
+    requested = {body for entry in entries for body in entry.bodies}
     counts = [(body, _positions(body)) for body in world.findall("body")]
     for key in root.findall("keyframe/key"):
         for other in ("qvel", "act", "ctrl", "mpos", "mquat"):
@@ -285,13 +285,13 @@ def _remove(root: ElementTree.Element, entries: Sequence[ObjectEntry]) -> None:
         if qpos := key.get("qpos", "").split():
             kept, at = [], 0
             for body, count in counts:
-                if body.get("name") not in wanted:
+                if body.get("name") not in requested:
                     kept += qpos[at : at + count]
                 at += count
             key.set("qpos", " ".join(kept))
     gone: set[str | None] = set()
     for body, _ in counts:
-        if body.get("name") in wanted:
+        if body.get("name") in requested:
             gone |= {element.get("name") for element in body.iter()}
             world.remove(body)
     gone.discard(None)

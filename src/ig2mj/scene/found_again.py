@@ -54,12 +54,12 @@ def find_again(additions: Sequence[Addition], file: str | os.PathLike) -> list[A
 
 
 def requests_again(
-    wanted: Sequence[str], entries: Sequence[Mapping[str, Any]], file: str | os.PathLike
+    requested: Sequence[str], entries: Sequence[Mapping[str, Any]], file: str | os.PathLike
 ) -> tuple[str, ...]:
     """Texts of `load_scene(objects=...)` in a file, with the folders where their models are now.
 
     Args:
-      wanted: the texts. entries: the additions that they gave, as of `entries_of`: what replaces objects of the home,
+      requested: the texts. entries: the additions that they gave, as of `entries_of`: what replaces objects of the home,
         where the file has it, and what was added. file: see `find_again`.
 
     Raises:
@@ -67,16 +67,18 @@ def requests_again(
     """
     try:
         known = [entry.addition() for entry in msgspec.convert(entries, list[AdditionEntry])]
-        wanted = msgspec.convert(wanted, tuple[str, ...])
+        requested = msgspec.convert(requested, tuple[str, ...])
     except msgspec.ValidationError as e:
         raise InputError(file, str(e), element="objects") from e
-    texts = added(wanted)
-    instead = {change.name: change for text in wanted if (change := read_change(text)) is not None and change.instead}
+    texts = added(requested)
+    instead = {
+        change.name: change for text in requested if (change := read_change(text)) is not None and change.instead
+    }
     replaced = {a.name: a for a in known[: len(known) - len(texts)] if a.name in instead}
     known = known[len(replaced) :]
     if len(known) != len(texts):
-        raise InputError(file, f"names {len(wanted)} objects and describes {len(known)}", element="objects")
-    found = [_replaced_again(text, replaced, file) for text in wanted if text not in texts]
+        raise InputError(file, f"names {len(requested)} objects and describes {len(known)}", element="objects")
+    found = [_replaced_again(text, replaced, file) for text in requested if text not in texts]
     for text, was, now in zip(texts, known, find_again(known, file), strict=True):
         moved = was.folder is not None and now.folder is not None and text.startswith(was.folder)
         found.append(f"{now.folder}{text.removeprefix(str(was.folder))}" if moved else text)

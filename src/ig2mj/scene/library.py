@@ -155,28 +155,28 @@ def read_model(folder: pathlib.Path, *, named: bool = False) -> LibraryModel:
     return LibraryModel(entry.category, entry.model, folder, own=True, named=named)
 
 
-def folder_of(wanted: str) -> pathlib.Path | None:
+def folder_of(requested: str) -> pathlib.Path | None:
     """The folder of an object that a text names: it holds a manifest.json, or is that file or the MJCF next to it."""
-    path = pathlib.Path(wanted).expanduser()
+    path = pathlib.Path(requested).expanduser()
     if path.name in (MANIFEST_FILE, MODEL_FILE) and path.is_file():
         path = path.parent
     return path if (path / MANIFEST_FILE).is_file() else None
 
 
-def find_model(wanted: str) -> LibraryModel:
-    """The model that `wanted` names.
+def find_model(requested: str) -> LibraryModel:
+    """The model that `requested` names.
 
     Args:
-      wanted: a folder that `ig2mj convert object` wrote; "apple", the first of this category; or "apple/apple_00". A
+      requested: a folder that `ig2mj convert object` wrote; "apple", the first of this category; or "apple/apple_00". A
         category of the library that ships comes before one of the user's own.
 
     Raises:
       UnknownNameError: there is no such category or model. ManifestError, InputError: see `read_model`, `own_library`.
     """
-    folder = None if isinstance(wanted, LibraryName) else folder_of(wanted)
+    folder = None if isinstance(requested, LibraryName) else folder_of(requested)
     if folder is not None:
         return read_model(folder, named=True)
-    category, _, model = wanted.partition("/")
+    category, _, model = requested.partition("/")
     shipped = library().get(category, {})
     if shipped and (not model or model in shipped):
         return shipped[model] if model else next(iter(shipped.values()))
@@ -184,12 +184,12 @@ def find_model(wanted: str) -> LibraryModel:
     models = own.get(category, {})
     if models and (not model or model in models):
         return models[model] if model else next(iter(models.values()))
-    raise _no_such_model(wanted, category, model, own)
+    raise _no_such_model(requested, category, model, own)
 
 
-def _no_such_model(wanted: str, category: str, model: str, own: dict[str, dict[str, LibraryModel]]) -> Ig2mjError:
+def _no_such_model(requested: str, category: str, model: str, own: dict[str, dict[str, LibraryModel]]) -> Ig2mjError:
     """The error with both readings: as a folder, and as a name."""
-    path = pathlib.Path(wanted).expanduser()
+    path = pathlib.Path(requested).expanduser()
     if path.suffix.lower() == ".urdf":
         out = path.with_suffix("")
         fix = f"`ig2mj convert object --urdf {path} --category CATEGORY --out {out}`, then give {out}"
@@ -205,4 +205,6 @@ def _no_such_model(wanted: str, category: str, model: str, own: dict[str, dict[s
     if synset(category) is not None:  # furniture has no models in the library
         also += f"; `ig2mj homes model {wanted} --out DIR` writes furniture as such a folder"
     names = [*categories, *(f"{c}/{m}" for c, models in own.items() for m in models)]
-    return UnknownNameError("category of the object library", wanted if "/" in wanted else category, names, also=also)
+    return UnknownNameError(
+        "category of the object library", requested if "/" in requested else category, names, also=also
+    )

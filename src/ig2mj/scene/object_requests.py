@@ -51,11 +51,11 @@ class ObjectRequest:
     predicate: tuple[str, str] | None = None
 
 
-def read_request(wanted: str | os.PathLike) -> ObjectRequest:
+def read_request(request: str | os.PathLike) -> ObjectRequest:
     """One value of `objects`. Raises Ig2mjError: it is none."""
-    if not isinstance(wanted, str | os.PathLike) or not os.fspath(wanted):
-        raise Ig2mjError(f"objects: {wanted!r} is neither a folder nor a name of the object library, such as 'plate'")
-    text, of_library = os.fspath(wanted), isinstance(wanted, LibraryName)
+    if not isinstance(request, str | os.PathLike) or not os.fspath(request):
+        raise Ig2mjError(f"objects: {request!r} is neither a folder nor a name of the object library, such as 'plate'")
+    text, of_library = os.fspath(request), isinstance(request, LibraryName)
     reference, mark, where = text.rpartition("@")
     if not mark or (not of_library and folder_of(text) is not None):
         return ObjectRequest(text, text)

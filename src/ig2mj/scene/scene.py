@@ -104,7 +104,7 @@ class Scene:
     @property
     def requested(self) -> list[str]:
         """What `load_scene(objects=...)` takes for its substances, changes and additions."""
-        return [*self.changes_as_text, *(addition.wanted for addition in self.additions)]
+        return [*self.changes_as_text, *(addition.requested for addition in self.additions)]
 
     @property
     def changes_as_text(self) -> list[str]:
@@ -147,7 +147,7 @@ class Scene:
         for file in (model_file(self.folder), self.folder / MANIFEST_FILE):
             hashed.update(file.read_bytes())
         hashed.update("\n".join((*self.object_names, *(a.sha256 for a in self.additions))).encode())
-        hashed.update("".join(a.wanted for a in self.additions if a.place is not None).encode())
+        hashed.update("".join(a.requested for a in self.additions if a.place is not None).encode())
         return hashed.hexdigest()
 
     def owns(self, digest: str | None) -> bool:
@@ -313,11 +313,11 @@ def _listed(objects: Objects) -> list[str | os.PathLike]:
 def _requests(objects: Objects) -> tuple[list[Change], list[ObjectRequest]]:
     """Changes and objects to add. Raises Ig2mjError."""
     changes, requests = list[Change](), list[ObjectRequest]()
-    for wanted in _listed(objects):
-        if (change := read_change(wanted)) is not None:
+    for text in _listed(objects):
+        if (change := read_change(text)) is not None:
             changes.append(change.canonical)
         else:
-            requests.append(read_request(wanted))
+            requests.append(read_request(text))
     return changes, requests
 
 

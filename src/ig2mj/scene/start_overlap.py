@@ -48,7 +48,7 @@ def check_start(model: mujoco.MjModel, tables: SceneTables, additions: list[Addi
         addition = placed[own]
         inside = tables.object_names[other] if other >= 0 else "the building"
         raise Ig2mjError(
-            f"'{addition.wanted}' starts {-100 * depth:.1f} cm inside of {inside}: give another place, or "
+            f"'{addition.requested}' starts {-100 * depth:.1f} cm inside of {inside}: give another place, or "
             f"{addition.reference}@on_top:OBJECT, which finds one"
         )
 

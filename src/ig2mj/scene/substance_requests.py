@@ -17,15 +17,15 @@ MOST = 24
 """Substances of one scene."""
 
 
-def is_substances(wanted: object) -> bool:
+def is_substances(requested: object) -> bool:
     """Whether a value of `objects` names substances."""
-    return isinstance(wanted, str) and wanted.startswith(PREFIX)
+    return isinstance(requested, str) and requested.startswith(PREFIX)
 
 
-def read_substances(wanted: Iterable[str | os.PathLike]) -> tuple[list[str], list[str | os.PathLike]]:
+def read_substances(requested: Iterable[str | os.PathLike]) -> tuple[list[str], list[str | os.PathLike]]:
     """Names of substances in values of `objects`, and the other values."""
     named, others = list[str](), list[str | os.PathLike]()
-    for value in wanted:
+    for value in requested:
         if is_substances(value):
             named += [name.strip() for name in str(value).removeprefix(PREFIX).split(",")]
         else:

@@ -85,7 +85,7 @@ class Camera(Protocol):
 def check_request(
     cameras: Sequence[str],
     rays: Sequence[RayPattern],
-    wanted: Sequence[bool],
+    requested: Sequence[bool],
     width: int,
     height: int,
     rows: tuple[int, int] | None = None,
@@ -93,5 +93,5 @@ def check_request(
     """Raises EngineError where there is nothing to make images of, or with."""
     if rows is not None and not 0 <= rows[0] < rows[1] <= height:
         raise EngineError(f"rows {rows[0]} to {rows[1]} are empty for images of {height} rows")
-    if (cameras and (not any(wanted) or min(width, height) < 1)) or not (cameras or rays):
+    if (cameras and (not any(requested) or min(width, height) < 1)) or not (cameras or rays):
         raise EngineError("a camera must have pixels and produce at least one of rgb, depth and segmentation")

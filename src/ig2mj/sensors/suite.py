@@ -89,7 +89,7 @@ class SensorSuite:
         self._whole = engine.program(self.read_fn)
 
     def _make_camera(self, engine: Engine) -> Camera:
-        wanted = frozenset().union(*(s.images for s in self._seen))
+        requested = frozenset().union(*(s.images for s in self._seen))
         options = self._setup.options
         settings: dict[str, Any] = {
             "width": options.width,
@@ -99,9 +99,9 @@ class SensorSuite:
             "rows": options.rows,
             "looks": options.looks,
             "rays": [pattern for pattern, _ in self._patterns.values()],
-            **{name: name in wanted for name in ("rgb", "depth", "segmentation")},
+            **{name: name in requested for name in ("rgb", "depth", "segmentation")},
         }
-        cameras = [self._setup.camera] if wanted else []
+        cameras = [self._setup.camera] if requested else []
         if engine.renderer not in CAMERAS:
             raise EngineError(
                 f"the {engine.name} engine neither renders images nor casts rays (take 'native' or 'warp')"
@@ -230,9 +230,9 @@ class SensorSuite:
         reading, space = sensor.read(self._setup, percept), self.spaces[sensor.name]
         shape, dtype = tuple(np.shape(reading)), jnp.result_type(reading)
         if not shape or shape[1:] != tuple(space.shape) or dtype != space.dtype:
-            wanted = ", ".join(["W", *map(str, space.shape)])
+            requested = ", ".join(["W", *map(str, space.shape)])
             raise PluginError(
-                f"sensor '{sensor.name}' gives {dtype}{list(shape)}; its space is {np.dtype(space.dtype)}[{wanted}]"
+                f"sensor '{sensor.name}' gives {dtype}{list(shape)}; its space is {np.dtype(space.dtype)}[{requested}]"
             )
         return reading
 

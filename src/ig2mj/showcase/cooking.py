@@ -59,7 +59,7 @@ def cook(world: Simulation, kitchen: Kitchen, watch: Watcher | None = None) -> T
 
 def missing(log: TemperatureLog, kitchen: Kitchen) -> list[str]:
     """What was to happen and has not."""
-    wanted = [
+    requested = [
         ("toggled_on", kitchen.stove, True),
         ("cooked", kitchen.fish, True),
         ("burnt", kitchen.fish, True),
@@ -68,6 +68,6 @@ def missing(log: TemperatureLog, kitchen: Kitchen) -> list[str]:
     ]
     return [
         str(Moment(0, 0.0, predicate, name, value))
-        for predicate, name, value in wanted
+        for predicate, name, value in requested
         if log.first(predicate, name, value) is None
     ]

@@ -82,8 +82,10 @@ class WorldSampler:
                 return move.write
             in_the_way |= dict.fromkeys(shoved)
             query.load(physics)
-        wanted = "opened" if value else "closed"
-        raise StateError(f"'{object_name}' cannot be {wanted} without moving {', '.join(in_the_way)} (move that first)")
+        requested = "opened" if value else "closed"
+        raise StateError(
+            f"'{object_name}' cannot be {requested} without moving {', '.join(in_the_way)} (move that first)"
+        )
 
     def _sampler_in(self, physics: Snapshot, states: ExtendedStates) -> RowSampler:
         if self._sampler is None:

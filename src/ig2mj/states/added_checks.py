@@ -170,9 +170,9 @@ def _called(spec: StateSpec, step: EventStep | HeatStep) -> EventStep | HeatStep
         why = " ".join(f"{type(e).__name__}: {e}".split())
         raise PluginError(f"the update of state '{spec.name}' (part '{spec.part}') fails: {why:.300}") from e
     if type(made) is not type(step):
-        wanted = type(step).__name__
+        requested = type(step).__name__
         raise PluginError(
-            f"the update of state '{spec.name}' gives {made!r:.80}; {wanted} is expected (step.having(...))"
+            f"the update of state '{spec.name}' gives {made!r:.80}; {requested} is expected (step.having(...))"
         )
     return made
 
@@ -187,11 +187,11 @@ def _changed(spec: StateSpec, step: Any, made: Any) -> list[tuple[str, Any]]:
         news, found = jax.tree.flatten(after)
         if len(olds) == len(news) and all(map(_is, olds, news)):
             continue
-        wanted, given = [_form(leaf) for leaf in olds], [_form(leaf) for leaf in news]
-        if structure != found or wanted != given:
+        requested, given = [_form(leaf) for leaf in olds], [_form(leaf) for leaf in news]
+        if structure != found or requested != given:
             raise PluginError(
                 f"the update of state '{spec.name}' gives '{name}' as {', '.join(given) or 'nothing'}; "
-                f"{', '.join(wanted)} is expected (W is {WORLDS} here)"
+                f"{', '.join(requested)} is expected (W is {WORLDS} here)"
             )
         changed.append((name, after))
     return changed

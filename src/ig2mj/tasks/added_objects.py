@@ -43,14 +43,14 @@ def with_objects(task: AnyTask, objects: Objects) -> AnyTask:
         return dataclasses.replace(task, added=references)
     texts = added(references)
     changes = [text for text in references if text not in texts]
-    wanted = [read_request(text) for text in texts]
-    pairs = list(zip(wanted, texts, strict=True))
+    requested = [read_request(text) for text in texts]
+    pairs = list(zip(requested, texts, strict=True))
     bare = [text if request.predicate is None else text.rpartition("@")[0] for request, text in pairs]
     taken = (o.name for o in load_manifest(scene_folder(task.home)).objects)
     names = [name for name, _ in name_additions(taken, [*task.objects, *bare])][len(task.objects) :]
     start = [
         f"({request.predicate[0]} {name} {request.predicate[1]})"
-        for request, name in zip(wanted, names, strict=True)
+        for request, name in zip(requested, names, strict=True)
         if request.predicate is not None
     ]
     return dataclasses.replace(task, objects=(*task.objects, *bare, *changes), start=(*task.start, *start))
@@ -67,11 +67,11 @@ def object_texts(objects: Objects) -> tuple[str, ...]:
     return tuple(map(_text, (objects,) if isinstance(objects, str | os.PathLike) else objects))
 
 
-def _text(wanted: str | os.PathLike) -> str:
-    if (change := read_change(wanted)) is not None:
+def _text(requested: str | os.PathLike) -> str:
+    if (change := read_change(requested)) is not None:
         return change.canonical.text
-    if is_substances(wanted):
-        return str(wanted)
-    request = read_request(wanted)
+    if is_substances(requested):
+        return str(requested)
+    request = read_request(requested)
     model = find_model(request.reference)
     return f"{model.reference}{request.text[len(request.reference) :]}" if model.named else request.text

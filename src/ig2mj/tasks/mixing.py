@@ -28,7 +28,7 @@ SEPARATION = 0.005
 """m: objects whose boxes are nearer to each other than this are not put there."""
 
 MOST_TRIES = 50
-"""Mixtures are drawn so many times as many as are wanted at most."""
+"""Mixtures are drawn so many times as many as are requested at most."""
 
 
 @struct.dataclass

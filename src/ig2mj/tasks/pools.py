@@ -187,11 +187,11 @@ def _pool(
     workers: concurrent.futures.Executor | None,
     file: pathlib.Path | None = None,
 ) -> Pool:
-    wanted, processes = count or COUNT[split], jobs or os.cpu_count() or 1
+    requested, processes = count or COUNT[split], jobs or os.cpu_count() or 1
 
     def sample_rows(tried: int, rows: int) -> Iterator[tuple[int, Pool | None]]:
         print(f"sampling {rows} start states of {task.name}, once{_hint(task, split, count)}", file=sys.stderr)
-        made, first, limit = 0, tried, CHUNK * limit_of(wanted)
+        made, first, limit = 0, tried, CHUNK * limit_of(requested)
         with contextlib.ExitStack() as stack_of:
             shared = workers
             if shared is None and processes > 1:
@@ -202,7 +202,7 @@ def _pool(
             for tried, drawn in stack_of.enter_context(contextlib.closing(batches)):
                 made += 0 if drawn is None else drawn.size
                 report(min(made, rows), rows, f"{min(made, rows)} of {rows}")
-                progress(wanted - rows + min(made, rows), wanted)
+                progress(requested - rows + min(made, rows), requested)
                 yield tried, drawn
                 if made >= rows or (tried - first >= HOPELESS and not made):
                     break
@@ -211,7 +211,7 @@ def _pool(
                 f"{task.name}: {tried - first} tries gave only {made} of {rows} start states within reach"
             )
 
-    return states.pool(wanted, sample_rows, file)
+    return states.pool(requested, sample_rows, file)
 
 
 def sampling_processes(jobs: int) -> concurrent.futures.Executor:
@@ -220,9 +220,9 @@ def sampling_processes(jobs: int) -> concurrent.futures.Executor:
     return concurrent.futures.ProcessPoolExecutor(jobs or os.cpu_count(), context, initializer=use_processor_only)
 
 
-def limit_of(wanted: int) -> int:
+def limit_of(requested: int) -> int:
     """Seeds after which too many rows were turned down: `MAX_CHUNKS`, or where less than one row in eight is good."""
-    return max(MAX_CHUNKS, 8 * -(-wanted // CHUNK))
+    return max(MAX_CHUNKS, 8 * -(-requested // CHUNK))
 
 
 def _batches(

@@ -120,7 +120,7 @@ class EpisodeView:
         yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         ahead = (float(base[0]) + 0.5 * math.cos(yaw), float(base[1]) + 0.5 * math.sin(yaw), 0.8)
         objects = [env.scene.object_index(name) for name in self._objects]
-        wanted = np.isin(tables.body_object[model.geom_bodyid], objects)
+        requested = np.isin(tables.body_object[model.geom_bodyid], objects)
         hands = np.isin(tables.body_hand[model.geom_bodyid], np.flatnonzero(tables.hand_agent == 0))
         middle, distance, elevation = ahead, DISTANCE, ELEVATION
         if self._moves_along:
@@ -131,7 +131,7 @@ class EpisodeView:
             ids = render(model, data, view, width=160, height=120, segmentation=True)
             geoms = ids[ids >= 0]
             first = np.isin(tables.body_object[model.geom_bodyid[geoms]], objects[:1])
-            return float(min(wanted[geoms].sum(), 800) + 3 * hands[geoms].sum() + 5 * first.sum())
+            return float(min(requested[geoms].sum(), 800) + 3 * hands[geoms].sum() + 5 * first.sum())
 
         views = [FreeView(middle, distance, math.degrees(yaw) + side, elevation) for side in SIDES]
         return max(views, key=seen)

@@ -68,9 +68,9 @@ def brought_to(area: PlayArea, head: Pose, body: Pose) -> PlayArea:
     """
     forward = body.turn.apply((1.0, 0.0, 0.0))
     faced = heading(area.pose * head)
-    wanted = math.atan2(forward[1], forward[0])
-    area = _turned(area, head, wanted - (wanted if faced is None else faced))
-    eye = body.pos + np.array([math.cos(wanted), math.sin(wanted), 0.0]) * EYE_POS[0]
+    requested = math.atan2(forward[1], forward[0])
+    area = _turned(area, head, requested - (requested if faced is None else faced))
+    eye = body.pos + np.array([math.cos(requested), math.sin(requested), 0.0]) * EYE_POS[0]
     now = (area.pose * head).pos
     return dataclasses.replace(area, x=area.x + float(eye[0] - now[0]), y=area.y + float(eye[1] - now[1]))
 

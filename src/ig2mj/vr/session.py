@@ -151,9 +151,9 @@ class Session:
             self.timing.end_frame()
 
     def goal(self) -> list[tuple[str, bool]]:
-        """What the goal is made of, as it is wanted, and whether that holds."""
+        """What the goal is made of, with the truth it needs, and whether that holds."""
         truth = np.asarray(self.state.status.literals)[0].tolist()
-        return [(text, holds == wanted) for (text, wanted), holds in zip(self._goal, truth, strict=False)]
+        return [(text, holds == requested) for (text, requested), holds in zip(self._goal, truth, strict=False)]
 
     def close(self) -> None:
         """Ends the recording; may be called twice."""
@@ -193,17 +193,17 @@ class Session:
 def goal_lines(env: Environment) -> list[tuple[str, bool]]:
     """For each literal of an environment's goal, in their order: its text, and whether it shall be true.
 
-    A literal that the goal names both ways counts as wanted true.
+    A literal that the goal names both ways counts as needed true.
     """
     goal = env.core.rules.goal if env.core.rules is not None else None
     if goal is None:
         return []
-    wanted: dict[Atom, bool] = {}
+    requested: dict[Atom, bool] = {}
 
     def walk(part: Any, sign: bool) -> None:
         match part:
             case Atom():
-                wanted[part] = wanted.get(part, False) or sign
+                requested[part] = requested.get(part, False) or sign
             case Not(inner):
                 walk(inner, not sign)
             case And(parts) | Or(parts) | Exactly(_, parts):
@@ -217,6 +217,6 @@ def goal_lines(env: Environment) -> list[tuple[str, bool]]:
     walk(goal.ground, True)
     found = []
     for atom in goal.atoms:
-        sign = wanted.get(atom, True)
+        sign = requested.get(atom, True)
         found.append((logic.text(atom if sign else Not(atom)), sign))
     return found

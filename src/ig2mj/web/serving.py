@@ -192,10 +192,10 @@ class GuardedConnection(ServerConnection):
             self._allowance = min(BURST, self._allowance + (now - self._since) * MESSAGES_PER_SECOND) - 1
             self._since = now
             reason = "too many messages" if self._allowance < 0 else ""
-            wanted = True
+            requested = True
             if not reason and self.gate.check is not None:
                 try:
-                    wanted = self.gate.check(message)
+                    requested = self.gate.check(message)
                 except ValueError:
                     reason = "malformed message"
             if reason:
@@ -203,7 +203,7 @@ class GuardedConnection(ServerConnection):
                 await self.close(1008, reason)
                 await self.wait_closed()
                 raise self.protocol.close_exc
-            if wanted:
+            if requested:
                 return message
 
 

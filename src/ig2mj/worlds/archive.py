@@ -72,12 +72,12 @@ def load_tree(file: str | os.PathLike, like: Tree, rows: str = "") -> tuple[Tree
     wanted_names = [name_of(keys) for keys, _ in jax.tree_util.tree_leaves_with_path(like)]
     check_lengths({n: arrays[n] for n in wanted_names if n.startswith(rows) and n in arrays}, file)
 
-    def leaf(keys: Any, wanted: Any) -> np.ndarray:
+    def leaf(keys: Any, requested: Any) -> np.ndarray:
         name = name_of(keys)
         if name not in arrays:
             raise InputError(file, "is missing", element=name, fix="make the file again with this version")
-        check_array(arrays[name], wanted, file, name)
-        return arrays[name].astype(wanted.dtype)
+        check_array(arrays[name], requested, file, name)
+        return arrays[name].astype(requested.dtype)
 
     return jax.tree_util.tree_map_with_path(leaf, like), header
 
@@ -101,11 +101,11 @@ def load_exactly(
       InputError: the file is missing, no such archive, damaged, or of other arrays.
     """
     leaves, structure = jax.tree_util.tree_flatten_with_path(like)
-    wanted, optional = {name_of(keys): leaf for keys, leaf in leaves}, dict(optional or {})
-    arrays, _ = _read(file, lambda name: name in wanted or name in optional)
+    requested, optional = {name_of(keys): leaf for keys, leaf in leaves}, dict(optional or {})
+    arrays, _ = _read(file, lambda name: name in requested or name in optional)
     there = optional if any(name in arrays for name in optional) else {}
     found = {}
-    for name, example in {**wanted, **there}.items():
+    for name, example in {**requested, **there}.items():
         if name not in arrays and name in (defaults or {}):
             arrays[name] = (defaults or {})[name]
         if name not in arrays:
@@ -118,20 +118,20 @@ def load_exactly(
             found[name] = array.astype(example.dtype)
         if array.dtype.kind in "iu" and (found[name] != array).any():
             raise InputError(file, "holds numbers that are out of range", element=name)
-    return jax.tree.unflatten(structure, [found[name] for name in wanted]), {name: found[name] for name in there}
+    return jax.tree.unflatten(structure, [found[name] for name in requested]), {name: found[name] for name in there}
 
 
-def check_array(array: np.ndarray, wanted: Any, file: str | os.PathLike, name: str) -> None:
-    """Raises InputError where an array is not of the kind, the rank or the inner shape of `wanted`, another array."""
-    if array.ndim != wanted.ndim or array.shape[1:] != wanted.shape[1:]:
+def check_array(array: np.ndarray, requested: Any, file: str | os.PathLike, name: str) -> None:
+    """Raises InputError where an array is not of the kind, rank or the inner shape of `requested`, another array."""
+    if array.ndim != requested.ndim or array.shape[1:] != requested.shape[1:]:
         raise InputError(
             file,
-            f"has shape {array.shape}, the scene needs (any, {', '.join(map(str, wanted.shape[1:]))})",
+            f"has shape {array.shape}, the scene needs (any, {', '.join(map(str, requested.shape[1:]))})",
             element=name,
             fix="make the file again for this scene",
         )
-    if not np.can_cast(array.dtype, wanted.dtype, "same_kind"):
-        raise InputError(file, f"is of type {array.dtype}, and {wanted.dtype} is needed", element=name)
+    if not np.can_cast(array.dtype, requested.dtype, "same_kind"):
+        raise InputError(file, f"is of type {array.dtype}, and {requested.dtype} is needed", element=name)
 
 
 def check_lengths(arrays: Mapping[str, np.ndarray], file: str | os.PathLike) -> None:
@@ -185,11 +185,11 @@ def name_of(keys: Any) -> str:
 
 
 def _read(
-    file: str | os.PathLike | bytes, wanted: Callable[[str], bool] = lambda name: True
+    file: str | os.PathLike | bytes, requested: Callable[[str], bool] = lambda name: True
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """The wanted arrays without the header, and the header. Raises InputError."""
+    """The requested arrays without the header, and the header. Raises InputError."""
     said = "packed arrays" if isinstance(file, bytes) else file
-    arrays = read_npz(file, lambda name: name == HEADER or wanted(name))
+    arrays = read_npz(file, lambda name: name == HEADER or requested(name))
     if HEADER not in arrays:
         raise InputError(said, "is not an archive of this project", element=HEADER)
     return arrays, decode_struct(arrays.pop(HEADER).tobytes(), dict, said)

@@ -118,7 +118,7 @@ def load_pool_scene(
     changed = [f"{a.category}/{a.model}" for a in additions if a.find().sha256 != a.sha256]
     if scene is None and header["scene"] not in shipped_homes():
         raise InputError(file, f"is of the home '{header['scene'][:60]}', which does not ship", fix="name its folder")
-    objects = [*header["changes"], *(a.wanted for a in additions)]
+    objects = [*header["changes"], *(a.requested for a in additions)]
     found = load_scene(header["scene"] if scene is None else scene, agents, objects)
     if changed and not found.owns(header.get("digest")):
         raise InputError(file, f"was made with another '{changed[0]}' added", fix=_FIX)
@@ -210,9 +210,9 @@ def _check_widths(
     inner = {"eq_data": (12,), "mocap_pos": (3,), "mocap_quat": (4,)}
     shapes = {name: (1, size, *inner.get(name, ())) for name, size in sizes.items()} | {"touching": (1, units, units)}
     kinds = {"eq_active": np.bool_, "tree_asleep": np.int32, "touching": np.bool_}
-    wanted = {f"physics.scene.{n}": np.empty(shape, kinds.get(n, np.float64)) for n, shape in shapes.items()}
-    wanted |= {f"states.{name_of(keys)}": leaf for keys, leaf in jax.tree_util.tree_leaves_with_path(states)}
-    for name, like in wanted.items():
+    requested = {f"physics.scene.{n}": np.empty(shape, kinds.get(n, np.float64)) for n, shape in shapes.items()}
+    requested |= {f"states.{name_of(keys)}": leaf for keys, leaf in jax.tree_util.tree_leaves_with_path(states)}
+    for name, like in requested.items():
         if name in arrays:
             check_array(arrays[name], like, file, name)
     counts = {"physics.scene.tree_asleep": sizes["tree_asleep"]}

@@ -41,8 +41,8 @@ def as_seed(seed: Seed, num_worlds: int | None = None) -> int | Int[Array, ""] |
     if isinstance(seed, Sequence | np.ndarray) and np.ndim(seed):  # pyright: ignore[reportArgumentType]
         seeds = np.asarray(seed)
         if num_worlds is None or seeds.shape != (num_worlds,) or not np.issubdtype(seeds.dtype, np.integer):
-            wanted = "one whole number" if num_worlds is None else f"{num_worlds} whole numbers, one for each world"
-            raise EngineError(f"seeds have shape {seeds.shape} and are of {seeds.dtype}: {wanted} or a single one")
+            requested = "one whole number" if num_worlds is None else f"{num_worlds} whole numbers, one for each world"
+            raise EngineError(f"seeds have shape {seeds.shape} and are of {seeds.dtype}: {requested} or a single one")
         return np.array([int(s) % LARGEST for s in seeds], np.int32)
     if not isinstance(seed, jax.Array | np.ndarray) or not jnp.issubdtype(seed.dtype, jnp.integer):
         raise EngineError(f"a seed is a whole number or a key of JAX, not {seed!r}")

@@ -66,8 +66,8 @@ def test_a_node_that_listens_hears_every_topic(bridge, listener):
     assert set(heard) == set(ros2_bridge.TOPICS)
     scan, options = heard["scan"], bridge.env.sensor_options
     assert len(scan.ranges) == options.scan_rays
-    wanted = options.scan_near + obs["scan"][:, 0] * (options.scan_far - options.scan_near)
-    assert np.allclose(scan.ranges, wanted, atol=1e-6)
+    expected = options.scan_near + obs["scan"][:, 0] * (options.scan_far - options.scan_near)
+    assert np.allclose(scan.ranges, expected, atol=1e-6)
     assert scan.angle_min == pytest.approx(-np.pi / 2) and scan.angle_increment * len(scan.ranges) == pytest.approx(
         np.pi
     )

@@ -140,11 +140,11 @@ def test_an_expert_goes_where_an_object_is_believed_to_be(fruit):
     moved["link_pos"] = np.array(view.link_pos)
     moved["link_pos"][:, own] += off[:, None]
     there = dataclasses.replace(world, view=dataclasses.replace(view, **moved))
-    wanted = expert(dataclasses.replace(state, batch=dataclasses.replace(state.batch, world=there)))
+    expected = expert(dataclasses.replace(state, batch=dataclasses.replace(state.batch, world=there)))
     base = Rotation.from_quat(np.asarray(view.agent.base_quat)[:, 0][:, [1, 2, 3, 0]])
     beliefs = {"carving_knife_0": Belief(base.inv().apply(off).astype(np.float32), np.tile([1.0, 0, 0, 0], (2, 1)))}
-    np.testing.assert_allclose(expert(state, beliefs), wanted, atol=1e-5)
-    assert np.abs(np.asarray(expert(state)) - np.asarray(wanted)).max() > 0.02
+    np.testing.assert_allclose(expert(state, beliefs), expected, atol=1e-5)
+    assert np.abs(np.asarray(expert(state)) - np.asarray(expected)).max() > 0.02
     right = no_error(PrivilegedTargets(0, len(NAMES), [n.replace("knife", "carving_knife_0") for n in NAMES]), 2)
     only = {"carving_knife_0": right["carving_knife_0"]}
     np.testing.assert_allclose(expert(state, only), expert(state), atol=1e-6)

@@ -69,8 +69,8 @@ def test_the_first_guess_is_kept_and_the_last_taking():
     first, taken = [0, 0, 0, 0, 0, 0, 6, 6], [0, 0, 0, 3, 3, 5, 6, 7]
     for k in range(8):
         for world, (f, t) in enumerate(((first[k], taken[k]), (0, 0))):
-            wanted = [*guess[f, world, [1, 3]], *guess[t, world, [1, 3]], *felt[t, world]]
-            np.testing.assert_array_equal(found[k][world], np.array(wanted, np.float32), err_msg=f"{k} {world}")
+            requested = [*guess[f, world, [1, 3]], *guess[t, world, [1, 3]], *felt[t, world]]
+            np.testing.assert_array_equal(found[k][world], np.array(requested, np.float32), err_msg=f"{k} {world}")
     mean, deviation = np.array([1.0, 0.0, 0.0]), np.array([0.5, 1.0, 0.01])
     normal = np.asarray(memory.normal(found[-1], felt[-1], mean, deviation))
     np.testing.assert_allclose(normal[:, :4], found[-1][:, :4])

@@ -202,8 +202,8 @@ class RobotBody:
 
     def moved_by(self, joints: Collection[str]) -> list[str]:
         """Links that any of these joints moves."""
-        wanted = set(joints)
-        return [link for link in self.links() if self.joints_to({link}) & wanted]
+        requested = set(joints)
+        return [link for link in self.links() if self.joints_to({link}) & requested]
 
     def joints_to(self, links: Collection[str]) -> set[str]:
         """Joints between the base and these links."""

@@ -194,20 +194,20 @@ def _sample(home: OwnHome, folder: pathlib.Path) -> None:
     asked: list[Condition] = []
     row: Row | None = None
     for number, (element, texts) in enumerate(_groups(home)):
-        wanted = _read(home, scene, element, texts)
-        if wanted:
+        requested = _read(home, scene, element, texts)
+        if requested:
             for attempt in range(ATTEMPTS):
-                row = _row(home, sampler, element, wanted, number + attempt * STRIDE)
+                row = _row(home, sampler, element, requested, number + attempt * STRIDE)
                 lost = unreachable(home, _boxes(home, sampler.query))
                 if not lost:
                     break
             else:
-                text = " and ".join(map(str, wanted))
+                text = " and ".join(map(str, requested))
                 problem = f"where {text} holds, a robot of 0.3 m radius has no way to {lost}"
                 raise home.description.error(element, problem, "give it another place")
             assert row is not None
             sampler.start_from(row.physics, row.states)
-            asked += wanted
+            asked += requested
     if row is None:
         return
     for condition in asked:
@@ -269,17 +269,17 @@ def _read(home: OwnHome, scene: Scene, element: str, texts: tuple[str, ...]) -> 
         raise home.description.error(element, str(e)) from e
 
 
-def _row(home: OwnHome, sampler: RowSampler, element: str, wanted: list[Condition], number: int) -> Row:
+def _row(home: OwnHome, sampler: RowSampler, element: str, requested: list[Condition], number: int) -> Row:
     """A state in which conditions hold, in addition to what stands. Raises InputError: none was found."""
     from ig2mj.sampling.many import sample_row
 
     try:
-        row, rejected = sample_row(sampler, wanted, home.description.seed, number)
+        row, rejected = sample_row(sampler, requested, home.description.seed, number)
     except (StateError, AbilityError, UnknownNameError) as e:
         raise home.description.error(element, str(e)) from e
     if row is None:
         reasons = _why(rejected)
-        text = " and ".join(map(str, wanted))
+        text = " and ".join(map(str, requested))
         raise home.description.error(element, f"{text} cannot be made true{reasons}")
     return row
 

@@ -106,8 +106,8 @@ def _random_subset(model: StateModel, worlds: int, key: Randomness) -> Bool[Arra
     xp = namespace(rank_of)
     rank = xp.sum(same & (rank_of[:, None, :] < rank_of[:, :, None]), axis=-1)
     count = same.sum(axis=-1)
-    wanted = uniform(size, (worlds, tables.num_objects))[:, tables.openable_object]
-    return rank < 1 + xp.floor(wanted * count)
+    requested = uniform(size, (worlds, tables.num_objects))[:, tables.openable_object]
+    return rank < 1 + xp.floor(requested * count)
 
 
 def _any_of_object(model: StateModel, of_joint: Bool[Array, "W J"]) -> Bool[Array, "W O"]:

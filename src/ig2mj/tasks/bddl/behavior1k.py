@@ -97,10 +97,10 @@ def unpack(archive: pathlib.Path, target: pathlib.Path, sha256: str = SHA256) ->
 
 
 def _download(work: pathlib.Path) -> pathlib.Path:
-    wanted = work / "requirements.txt"
-    wanted.write_text(f"bddl=={VERSION} --hash=sha256:{SHA256}\n", encoding="utf-8")
+    requested = work / "requirements.txt"
+    requested.write_text(f"bddl=={VERSION} --hash=sha256:{SHA256}\n", encoding="utf-8")
     arguments = ["download", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-binary", "bddl"]
-    arguments += ["--require-hashes", "--dest", str(work), "--requirement", str(wanted)]
+    arguments += ["--require-hashes", "--dest", str(work), "--requirement", str(requested)]
     done = subprocess.run([*_pip(), *arguments], capture_output=True, text=True, check=False)
     found = sorted(work.glob("bddl-*.tar.gz"))
     if done.returncode or not found:

@@ -133,8 +133,8 @@ class _Binder:
         if self.reasons:
             raise BindingError(self.activity.name, self.manifest.name, self.reasons)
         tools = self.lacking_tools()
-        wanted = [*(f"{m.category}/{m.model}" for m in self.added.values()), *tools]
-        named = name_additions((o.name for o in self.manifest.objects), wanted)
+        requested = [*(f"{m.category}/{m.model}" for m in self.added.values()), *tools]
+        named = name_additions((o.name for o in self.manifest.objects), requested)
         self.objects |= {name: new for name, (new, _) in zip(self.added, named, strict=False)}
         for half, (whole, number) in self.activity.halves.items():
             self.objects[half] = self.half_of(whole, number)
@@ -145,7 +145,7 @@ class _Binder:
             home=self.manifest.name,
             objects={name: self.objects[name] for name in order},
             rooms=self.rooms,
-            additions=tuple(wanted),
+            additions=tuple(requested),
             added=tuple(new for new, _ in named),
             agents=dict(zip(mine, agents, strict=False)),
             stand_ins={s: k.instead for s, k in self.kinds.items() if k.instead is not None},

@@ -201,11 +201,11 @@ class GoalSampler:
                 rejected["no reading of the goal is possible"] += 1
                 break
             reading = self._conditions(literals)
-            wanted, again = reading, ()
+            requested, again = reading, ()
             if attempt % 2 == 0:
-                wanted, again = self._with_help(reading)
+                requested, again = self._with_help(reading)
             budget = Budget(ATTEMPT_BUDGET, left, time.process_time)
-            row = sampler.sample(wanted, rng, budget, rejected, keep=True, again=again)
+            row = sampler.sample(requested, rng, budget, rejected, keep=True, again=again)
             if row is not None and self._goal(world_of(sampler.query, row.states))[0]:
                 return GoalState(row, rejected, attempt, reading)
             if row is not None:

@@ -198,8 +198,8 @@ class _Reader:
     def atom(self, tree: SyntaxGroup, head: Word, parts: tuple[Tree, ...], bound: Collection[str], top: bool) -> Atom:
         if head.text not in self.predicates:
             raise self.error(head, f"is not a predicate of domain {self.domain}{_near(head.text, self.predicates)}")
-        if len(parts) != (wanted := self.predicates[head.text]):
-            raise self.error(tree, f"takes {wanted} arguments, has {len(parts)}")
+        if len(parts) != (requested := self.predicates[head.text]):
+            raise self.error(tree, f"takes {requested} arguments, has {len(parts)}")
         if head.text == IN_ROOM and not top:
             raise self.error(head, "is allowed in :init only")
         arguments = []

@@ -90,11 +90,11 @@ def start_conditions(binding: Binding, scene: Scene) -> list[Condition]:
 
     found = [c for c in read if not is_given(c) and c.predicate != "present"]
     placed = {c.arguments[0] for c in found if c.is_placement and c.value}
-    wanted = [
+    requested = [
         (binding.objects[name], room) for name, room in binding.rooms.items() if binding.objects[name] in binding.added
     ]
-    wanted += [(tool, room or scene.object_names[0]) for tool, room in binding.tools.items()]
-    return [*found, *(Condition("on_floor", (new, room)) for new, room in wanted if new not in placed)]
+    requested += [(tool, room or scene.object_names[0]) for tool, room in binding.tools.items()]
+    return [*found, *(Condition("on_floor", (new, room)) for new, room in requested if new not in placed)]
 
 
 def load_bound(binding: Binding, home: str | os.PathLike | None = None, added: Sequence[str] = ()) -> Scene:
@@ -145,9 +145,9 @@ def sample_start(
     Args:
       scene: as `load_bound` gives it. The others: as of `ig2mj.sampling.many.sample`, which also says what is raised.
     """
-    wanted = [c.expression for c in start_conditions(binding, scene)]
+    requested = [c.expression for c in start_conditions(binding, scene)]
     done = many.sample(
-        scene, wanted, count, seed, jobs=jobs, seconds_per_row=seconds_per_row, progress=progress, **options
+        scene, requested, count, seed, jobs=jobs, seconds_per_row=seconds_per_row, progress=progress, **options
     )
     return SampledStart(done, () if done.pool is None else rows_where_goal_holds(binding, scene, done.pool))
 

@@ -110,11 +110,11 @@ def activity_pool(task: BddlTask, split: str = "train", count: int | None = None
     Raises:
       UnknownNameError: no such split. EngineError: none could be sampled.
     """
-    states, wanted = activity_states(task, split), count or ROWS
+    states, requested = activity_states(task, split), count or ROWS
 
     def sample_rows(tried: int, rows: int) -> Iterator[tuple[int, Pool | None]]:
         print(f"sampling {rows} start states of {task.name} in {task.home}, once", file=sys.stderr)
-        made, last, reasons, reached = 0, tried + TRIES * wanted, collections.Counter[str](), False
+        made, last, reasons, reached = 0, tried + TRIES * requested, collections.Counter[str](), False
         while made < rows and tried < last:
             count = min(rows - made, last - tried)
             with progress(f"sampling start states of {task.name}") as report:
@@ -133,12 +133,12 @@ def activity_pool(task: BddlTask, split: str = "train", count: int | None = None
             good = np.setdiff1d(np.arange(0 if drawn is None else drawn.size), done.reached)
             made += len(good)
             yield tried, drawn.rows(good) if drawn is not None and len(good) else None
-        if not made and tried == last and rows == wanted:
+        if not made and tried == last and rows == requested:
             if reached:
                 raise EngineError(f"{task.name} is already done in every start state that was sampled")
             raise EngineError(f"no start of {task.name} could be sampled: {dict(reasons.most_common(3))}")
 
-    return states.pool(wanted, sample_rows)
+    return states.pool(requested, sample_rows)
 
 
 def activity_states(task: BddlTask, split: str = "train") -> StartStates:

@@ -287,7 +287,7 @@ def _new(own: CustomTask, code: TaskCode) -> Task:
         code=code,
         **fields,
     )
-    objects = [_relative(wanted, folder) for wanted in _strings(own, code, "objects")]
+    objects = [_relative(requested, folder) for requested in _strings(own, code, "objects")]
     with blamed(code, "home"):
         scene_folder(task.home)
     with blamed(code, "objects"):

@@ -23,16 +23,16 @@ def digest_in(source: str, name: str, folder: pathlib.Path) -> str | None:
       source: of the file. folder: its own.
     """
     statements = ast.parse(source).body
-    wanted, seen, used = [name], set[str](), set[int]()
-    while wanted:
-        one = wanted.pop()
+    requested, seen, used = [name], set[str](), set[int]()
+    while requested:
+        one = requested.pop()
         if one in seen:
             continue
         seen.add(one)
         for number, statement in enumerate(statements):
             if one in _bound(statement) and number not in used:
                 used.add(number)
-                wanted += _read(statement)
+                requested += _read(statement)
     if not used:
         return None
     hashed = hashlib.blake2b(digest_size=16)
@@ -83,13 +83,13 @@ def _read(statement: ast.stmt) -> list[str]:
 
 def _modules(statement: ast.stmt, folder: pathlib.Path) -> Iterator[str]:
     """Texts of the modules of the folder that a statement imports, and of those that these import."""
-    wanted, seen = [statement], set[pathlib.Path]()
-    while wanted:
-        for file in _imported(wanted.pop(), folder):
+    requested, seen = [statement], set[pathlib.Path]()
+    while requested:
+        for file in _imported(requested.pop(), folder):
             if file not in seen:
                 seen.add(file)
                 tree = ast.parse(file.read_text(encoding="utf-8"))
-                wanted.append(tree)  # pyright: ignore[reportArgumentType]
+                requested.append(tree)  # pyright: ignore[reportArgumentType]
                 yield _text(tree)
 
 

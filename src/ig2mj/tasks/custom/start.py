@@ -50,11 +50,11 @@ class StartWorld:
         Raises:
           UnknownNameError, StateError, AbilityError, ExpressionError: a condition can never be made true.
         """
-        wanted = bind(read_conditions(conditions), self._sampler.model.tables, self._rng)
+        requested = bind(read_conditions(conditions), self._sampler.model.tables, self._rng)
         begin = self._sampler.start
         self._sampler.start_from(self._sampler.query.save(), self._states)
         try:
-            row = self._sampler.sample(wanted, self._rng, Budget(ROW_BUDGET), reasons := collections.Counter())
+            row = self._sampler.sample(requested, self._rng, Budget(ROW_BUDGET), reasons := collections.Counter())
         finally:
             self._sampler.start_from(*begin)
         if row is None:
@@ -96,8 +96,8 @@ class StartWorld:
 
     def holds(self, condition: str) -> bool:
         """Whether a condition holds now. Raises as `sample`."""
-        wanted = bind(read_conditions([condition]), self._sampler.model.tables, self._rng)
-        return self._sampler.holds(wanted, self._states)
+        requested = bind(read_conditions([condition]), self._sampler.model.tables, self._rng)
+        return self._sampler.holds(requested, self._states)
 
     def finished(self) -> Row:
         """The state as it is, at rest. Raises NoStart."""

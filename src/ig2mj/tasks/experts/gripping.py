@@ -94,8 +94,8 @@ def grip_from_above(see: ExpertView, name: str, along: Float[Array, "W 3"], carr
     across = jnp.cross(jnp.broadcast_to(UP, place.shape), _level(along))
     across *= jnp.where(jnp.sum(across * quat_rotate(quat, LEFT), axis=1) < 0, -1.0, 1.0)[:, None]
     down = jnp.broadcast_to(-UP, place.shape)
-    wanted = matrix_to_quat(jnp.stack([down, across, jnp.cross(down, across)], axis=-1))
-    turn = quat_to_rotation_vector(quat_multiply(wanted, quat_conjugate(quat)))
+    requested = matrix_to_quat(jnp.stack([down, across, jnp.cross(down, across)], axis=-1))
+    turn = quat_to_rotation_vector(quat_multiply(requested, quat_conjugate(quat)))
     goal = jnp.where((length(turn) < ALIGNED)[:, None], place, place + ABOVE * UP)
     get = hand_motion(EASE * over(grip, goal, place[:, 2] + ABOVE, EXACT, BLEND), turn)
     close = hand_motion(jnp.zeros_like(place), close=True)

@@ -80,8 +80,8 @@ def around(
     apart = length(offset)[:, None]
     out = offset / jnp.maximum(apart, 1e-6)
     along = jnp.sum(move[:, :2] * out, axis=1, keepdims=True)
-    wanted = jnp.maximum(along, radius - apart)
-    flat = move[:, :2] + (wanted - along) * out
+    requested = jnp.maximum(along, radius - apart)
+    flat = move[:, :2] + (requested - along) * out
     return jnp.concatenate([flat, move[:, 2:]], axis=1)
 
 
@@ -122,12 +122,12 @@ def pointing(quat: Float[Array, "W 4"], direction: Float[Array, "W 3"], pitch: f
     yaw = jnp.arctan2(direction[:, 1], direction[:, 0])
     up = jnp.array([0.0, 0.0, 1.0])
     level = axis_angle_to_quat(up, yaw)
-    wanted = quat_multiply(level, axis_angle_to_quat(jnp.array([0.0, 1.0, 0.0]), jnp.full_like(yaw, pitch)))
+    requested = quat_multiply(level, axis_angle_to_quat(jnp.array([0.0, 1.0, 0.0]), jnp.full_like(yaw, pitch)))
     left = quat_rotate(level, jnp.array([0.0, 1.0, 0.0]))
     upside_down = jnp.sum(left * quat_rotate(quat, jnp.array([0.0, 1.0, 0.0])), axis=1) < 0
-    over = quat_multiply(wanted, jnp.array([0.0, 1.0, 0.0, 0.0]))
-    wanted = jnp.where(upside_down[:, None], over, wanted)
-    return quat_to_rotation_vector(quat_multiply(wanted, quat_conjugate(quat)))
+    over = quat_multiply(requested, jnp.array([0.0, 1.0, 0.0, 0.0]))
+    requested = jnp.where(upside_down[:, None], over, requested)
+    return quat_to_rotation_vector(quat_multiply(requested, quat_conjugate(quat)))
 
 
 def where(condition: Bool[Array, "W"], then: HandMotion, otherwise: HandMotion) -> HandMotion:

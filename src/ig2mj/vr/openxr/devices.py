@@ -108,11 +108,11 @@ class Headset:
         if needed not in offered:
             raise EngineError(f"the OpenXR runtime lacks {needed}; it offers {', '.join(sorted(offered)) or 'nothing'}")
         self.gazes = GAZE in offered
-        wanted = [needed, *([GAZE] if self.gazes else [])]
+        requested = [needed, *([GAZE] if self.gazes else [])]
         about = xr.ApplicationInfo("ig2mj", 1, "ig2mj", 1, xr.Version(1, 0, 0))
         try:
             self._instance = xr.create_instance(
-                xr.InstanceCreateInfo(application_info=about, enabled_extension_names=wanted)
+                xr.InstanceCreateInfo(application_info=about, enabled_extension_names=requested)
             )
             self._open(graphics)
         except xr.exception.XrException as e:
