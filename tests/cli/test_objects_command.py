@@ -55,7 +55,7 @@ def test_an_object_is_shown_with_its_abilities(capsys, cup):
     assert found["abilities"]["stainable"] == {"stained_threshold": 0.5}
 
 
-@pytest.mark.parametrize("wanted", ["mgu", "obj/nothing", "mug/mug_99"])
+@pytest.mark.parametrize("expected", ["mgu", "obj/nothing", "mug/mug_99"])
 def test_an_object_that_does_not_exist_is_one_line_with_both_readings(capsys, expected):
     status, _, err = call(capsys, "objects", "show", expected)
     assert status == 2 and err.count("\n") == 1 and "object library" in err and "manifest.json" in err

@@ -77,7 +77,7 @@ def test_a_command_may_have_commands_itself(capsys):
 
 
 @pytest.mark.parametrize(
-    ("wanted", "line"),
+    ("expected", "line"),
     [
         ({"states": [OLD]}, "state 'old': register an ig2mj.states.StateSpec, not Predicate"),
         ({"sensors": [7]}, r"sensor '\?': register an ig2mj.sensors.Sensor, not 7"),

@@ -75,7 +75,7 @@ def test_an_addition_with_a_place_is_fixed_there(plain):
     assert scene.digest == again.digest != elsewhere.digest
 
 
-@pytest.mark.parametrize("wanted", ["shelf", "shelf@1,2", "shelf@1,2,3,left"])
+@pytest.mark.parametrize("expected", ["shelf", "shelf@1,2", "shelf@1,2,3,left"])
 def test_fixed_furniture_wants_a_place_of_four_numbers(expected):
     with pytest.raises(Ig2mjError, match=r"1,2,0\.9,-90|x,y,z,yaw"):
         load_scene("birch", objects=[expected])
@@ -150,7 +150,7 @@ def test_hashes_tell_models_apart_and_stay_the_same(stocked):
 
 
 @pytest.mark.parametrize(
-    ("wanted", "telling"),
+    ("expected", "telling"),
     [("applee", "near matches: apple"), ("apple/apple_77", "no model of 'apple'"), ("fridge", "no category")],
 )
 def test_what_the_library_lacks_is_named(expected, telling):

@@ -114,7 +114,7 @@ def test_assets_of_the_same_name_and_other_content_are_kept_apart(tiny_home_fold
 
 
 @pytest.mark.parametrize(
-    ("wanted", "said"),
+    ("expected", "said"),
     [
         ("obj/cup", "near matches: cup.*there is no folder obj/cup with a manifest.json .*convert object"),
         ("nothing_like_it_at_all", "no category of the object library.*no folder nothing_like_it_at_all"),

@@ -46,7 +46,7 @@ def test_texts_hold_whole_paths_and_are_kept_with_an_environment(cup, monkeypatc
 
 
 @pytest.mark.parametrize(
-    ("wanted", "error", "said"),
+    ("expected", "error", "said"),
     [
         ("mug@1,2", Ig2mjError, "the place of an object"),
         ("mgu", UnknownNameError, "mug"),
