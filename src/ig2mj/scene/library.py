@@ -203,7 +203,7 @@ def _no_such_model(requested: str, category: str, model: str, own: dict[str, dic
         models = [*library().get(category, {}), *own.get(category, {})]
         return UnknownNameError(f"model of '{category}' in the object library", model, models, also=also)
     if synset(category) is not None:  # furniture has no models in the library
-        also += f"; `ig2mj homes model {wanted} --out DIR` writes furniture as such a folder"
+        also += f"; `ig2mj homes model {requested} --out DIR` writes furniture as such a folder"
     names = [*categories, *(f"{c}/{m}" for c, models in own.items() for m in models)]
     return UnknownNameError(
         "category of the object library", requested if "/" in requested else category, names, also=also

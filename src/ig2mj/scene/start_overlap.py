@@ -65,7 +65,7 @@ def _check_heights(
         low = float(_heights(model, data, geoms)[:, 0].min()) if len(geoms) else -np.inf
         if low > top:
             raise Ig2mjError(
-                f"'{addition.wanted}' starts {low:.1f} m above the floor, and the walls end at {top:.1f} m: give a "
+                f"'{addition.requested}' starts {low:.1f} m above the floor, and the walls end at {top:.1f} m: give a "
                 f"lower place, or {addition.reference}@on_top:OBJECT, which finds one"
             )
 
@@ -85,7 +85,9 @@ def _check_walls(
         ]
         depth = min((mujoco.mj_geomDistance(model, data, *pair, 0.1, fromto) for pair in near), default=0.0)
         if depth < -DEEPEST_FIXED:
-            raise Ig2mjError(f"'{addition.wanted}' is fixed {-100 * depth:.0f} cm inside of a wall: give another place")
+            raise Ig2mjError(
+                f"'{addition.requested}' is fixed {-100 * depth:.0f} cm inside of a wall: give another place"
+            )
 
 
 def _heights(model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray) -> np.ndarray:
