@@ -143,7 +143,7 @@ def _rule(entry: Any, number: int, file: str | os.PathLike) -> Transition:
         except UnknownNameError as e:
             raise InputError(file, str(e), element=element) from e
         if not made.has_volume:
-            raise InputError(file, f"'{requested}' covers objects, and is never in a container", element=element)
+            raise InputError(file, f"'{wanted}' covers objects, and is never in a container", element=element)
     if output in inputs:
         raise InputError(file, f"makes {output} of itself", element=element)
     return Transition(name, tuple(inputs), output, float(temperature), stir)
