@@ -59,8 +59,8 @@ def requests_again(
     """Texts of `load_scene(objects=...)` in a file, with the folders where their models are now.
 
     Args:
-      requested: the texts. entries: the additions that they gave, as of `entries_of`: what replaces objects of the home,
-        where the file has it, and what was added. file: see `find_again`.
+      requested: the texts. entries: the additions that they gave, as of `entries_of`: what replaces objects of the
+        home, where the file has it, and what was added. file: see `find_again`.
 
     Raises:
       InputError: a model is missing, or the entries do not belong to the texts.
