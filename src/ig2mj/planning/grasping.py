@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ig2mj.planning.moves import (
     Program,
     ahead,
     carry,
+    first_way,
     free_hand,
     hand_path,
     hand_with,
@@ -68,7 +69,7 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     _, yaw = world.base
     start = pose.at(pose.before)
     spheres = world.spheres(pose.fingers, pose.palm)
-    way = hand_path(world.obstacles([name]), spheres, world.grip(hand), start, entries(pose, yaw))
+    way = hand_path(world.obstacles([name]), spheres, world.grip(hand), start, entries(pose, yaw), search=True)
     if way is None:
         return "no_path", f"the hand has no way to {name}"
     quat = world.body.turned(hand, pose.fingers, pose.palm)
@@ -107,22 +108,20 @@ def _plan(world: PlannedWorld, name: str, hand: int, tried: Sequence[GraspPose])
     poses = [p for p in grasp_poses(world, name, obstacles) if not any(_alike(p, t) for t in tried)]
     if not poses:
         return None
-    count = 0
     points = np.array([p.point for p in poses])
-    for point in (world.com(name), *points[_spread(points, world.com(name))]):
-        for stance in world.stances(hand, point, floor, AWAY):
-            for pose in ordered(poses, stance.yaw)[:POSES]:
-                goal = pose.at(pose.before)
-                if not world.reaches(hand, stance, goal):
-                    continue
-                spheres = world.spheres(pose.fingers, pose.palm)
-                rests = world.resting(hand, stance)
-                if hand_path(obstacles, spheres, rests, goal, entries(pose, stance.yaw)) is not None:
-                    return stance, pose
-                count += 1
-                if count >= WAYS:
-                    return None
-    return None
+
+    def candidates() -> Iterator[tuple[Stance, GraspPose]]:
+        for point in (world.com(name), *points[_spread(points, world.com(name))]):
+            for stance in world.stances(hand, point, floor, AWAY):
+                near = [p for p in ordered(poses, stance.yaw) if world.reaches(hand, stance, p.at(p.before))]
+                yield from ((stance, pose) for pose in near[:POSES])
+
+    def has_way(candidate: tuple[Stance, GraspPose], search: bool) -> bool:
+        stance, pose = candidate
+        spheres, goal, back = world.spheres(pose.fingers, pose.palm), pose.at(pose.before), entries(pose, stance.yaw)
+        return hand_path(obstacles, spheres, world.resting(hand, stance), goal, back, search=search) is not None
+
+    return first_way(candidates(), has_way, WAYS)
 
 
 def _alike(one: GraspPose, other: GraspPose) -> bool:

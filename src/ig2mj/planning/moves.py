@@ -7,14 +7,18 @@ success), and returns its outcome.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
+from typing import TypeVar
 
 import numpy as np
 
 from ig2mj.planning.clearance import Obstacles, hand_way, straight
+from ig2mj.planning.hand_search import search_way
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome
 from ig2mj.planning.world import PlannedWorld, Vector
+
+Candidate = TypeVar("Candidate")
 
 Program = list[Phase]
 Primitive = Generator[Program, str, Outcome]
@@ -56,23 +60,29 @@ def hand_path(
     goal: Vector,
     entries: Sequence[Vector] = (),
     spare: float = 0.0,
+    search: bool = False,
 ) -> list[Vector] | None:
     """Points of a hand's way, without the first; None: no way was found. See `ig2mj.planning.clearance.hand_way`.
 
     Args:
       entries: unit vectors from the goal, along which a hand comes straight to it where nothing else is free.
+      search: ways around obstacles are searched for (`ig2mj.planning.hand_search`), where via points find none.
     """
     way = hand_way(obstacles, spheres, start, goal, spare)
     if way is not None:
         return way
-    for apart in ENTRIES:
-        for entry in entries:
-            before = goal + apart * entry
-            if not straight(obstacles, spheres, before, goal, spare):
-                continue
-            way = hand_way(obstacles, spheres, start, before)
-            if way is not None:
-                return [*way, goal]
+    ends = [goal + apart * entry for apart in ENTRIES for entry in entries]
+    ends = [end for end in ends if straight(obstacles, spheres, end, goal, spare)]
+    for end in ends:
+        way = hand_way(obstacles, spheres, start, end)
+        if way is not None:
+            return [*way, goal]
+    if not search:
+        return None
+    for end in [goal] if spare == 0.0 else ends[:1]:
+        way = search_way(obstacles, spheres, start, end)
+        if way is not None:
+            return way if end is goal else [*way, goal]
     return None
 
 
@@ -101,6 +111,23 @@ def carry(world: PlannedWorld, hand: int, keeps: int = -1, name: str = "") -> Ph
 def rest(hand: int) -> Program:
     """The open hand goes back to where it rests."""
     return [Phase(hand=hand, reset=True, close=False, until=Until.WAITED, limit=4)]
+
+
+SEARCHES = 6
+"""Ways of a hand that are searched for at most, where via points find none for any pose."""
+
+
+def first_way(candidates: Iterable[Candidate], find: Callable[[Candidate, bool], bool], most: int) -> Candidate | None:
+    """The first of some candidates (stances with poses) with a way for the hand: via points are tried for `most`, then
+    ways are searched for, for the first of them."""
+    tried = []
+    for candidate in candidates:
+        if find(candidate, False):
+            return candidate
+        tried.append(candidate)
+        if len(tried) >= most:
+            break
+    return next((c for c in tried[:: max(1, len(tried) // SEARCHES)] if find(c, True)), None)
 
 
 def free_hand(world: PlannedWorld, attempt: int = 0) -> int:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from ig2mj.planning.driving import go
+from ig2mj.planning.grasping import grasp
 from ig2mj.planning.moves import (
     ATTEMPTS,
     LET_GO,
@@ -12,6 +13,7 @@ from ig2mj.planning.moves import (
     UP,
     Primitive,
     ahead,
+    first_way,
     hand_path,
     hand_with,
     quaternion,
@@ -36,9 +38,14 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
 
     def place(world: PlannedWorld, step: Step) -> Primitive:
         name, where = step.arguments
-        hand = hand_with(world, name)
+        hand_with(world, name)
         reason, detail = "no_base", ""
         for attempt in range(ATTEMPTS):
+            if name not in world.held:  # it fell, or was put where the relation is false
+                again = yield from grasp(world, Step("grasp", (name,)))
+                if not again.done:
+                    break
+            hand = hand_with(world, name)
             found = _plan(world, predicate, name, where, hand)
             if isinstance(found, str):
                 reason = "no_path" if found == _NO_WAY else "no_base"
@@ -50,18 +57,21 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             if reason := (yield from go(world, stance)):
                 continue
             if name not in world.held:
-                return Outcome("slipped", f"the hand lost {name}", attempts=attempt + 1)
+                reason, detail = "slipped", f"the hand lost {name}"
+                continue
             _, yaw = world.base
             target, quat, rotation = world.grip_for(hand, name, spot)
             fingers, palm = world.hand_axes(hand, rotation)
             target = target + LET_GO * UP
             spheres = world.spheres(fingers, palm, holding=name, hand=hand, rotation=rotation)
-            way = hand_path(world.obstacles([name]), spheres, world.grip(hand), target, [UP, -ahead(yaw)], SPARE)
+            way = hand_path(world.obstacles([name]), spheres, world.grip(hand), target, [UP, -ahead(yaw)], SPARE, True)
             if way is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
             keeps, turned = world.index(name), quaternion(quat)
             reason = yield [
+                Phase(hand=hand, pos=vector3(world.grip(hand)), quat=turned, keeps=keeps, tolerance=0.05, limit=30,
+                      after=""),
                 *travel(hand, way, turned, keeps=keeps),
                 Phase(hand=hand, pos=vector3(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1,
                       limit=20, after="", speed=0.03),
@@ -73,8 +83,7 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             ]  # fmt: skip
             if world.facts.holds(predicate, name, where):
                 return Outcome(attempts=attempt + 1)
-            if name not in world.held:
-                return Outcome(reason or "not_true_after", f"{name} is not where it was put", attempts=attempt + 1)
+            reason, detail = reason or "not_true_after", f"{name} is not where it was put"
         return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
     return place
@@ -87,16 +96,23 @@ _NO_WAY = "the hand has no way to a place where"
 def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int) -> tuple[Stance, Spot] | str:
     """A stance and a pose of the object's main body, of those with a way for the hand; else what is lacking."""
     obstacles, floor = world.obstacles([name]), world.floor()
-    tried, lacking = 0, _NO_SPOT
-    for spot in world.spots(predicate, name, where):
+    lacking = _NO_SPOT
+
+    def candidates() -> Iterator[tuple[Stance, Spot]]:
+        nonlocal lacking
+        for spot in world.spots(predicate, name, where):
+            target, _, rotation = world.grip_for(hand, name, spot)
+            spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+            lacking = _NO_STANCE if lacking == _NO_SPOT else lacking
+            for stance in world.stances(hand, target, floor, world.away(spheres), most=STANCES):
+                lacking = _NO_WAY
+                yield stance, spot
+
+    def has_way(candidate: tuple[Stance, Spot], search: bool) -> bool:
+        stance, spot = candidate
         target, _, rotation = world.grip_for(hand, name, spot)
         spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
-        lacking = _NO_STANCE if lacking == _NO_SPOT else lacking
-        for stance in world.stances(hand, target, floor, world.away(spheres), most=STANCES):
-            lacking, back = _NO_WAY, [UP, -ahead(stance.yaw)]
-            if hand_path(obstacles, spheres, world.carried(hand, stance), target + LET_GO * UP, back, SPARE):
-                return stance, spot
-            tried += 1
-            if tried > WAYS:
-                return lacking
-    return lacking
+        start, back = world.carried(hand, stance), [UP, -ahead(stance.yaw)]
+        return hand_path(obstacles, spheres, start, target + LET_GO * UP, back, SPARE, search) is not None
+
+    return first_way(candidates(), has_way, WAYS) or lacking

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ig2mj.planning.moves import (
     UP,
     Primitive,
     ahead,
+    first_way,
     free_hand,
     hand_path,
     rest,
@@ -55,7 +56,9 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             _, yaw = world.base
             fingers = ahead(yaw)
             quat = world.body.turned(hand, fingers, DOWN)
-            way = hand_path(world.obstacles(), world.spheres(fingers), world.grip(hand), aim, [UP, -fingers])
+            way = hand_path(
+                world.obstacles(), world.spheres(fingers), world.grip(hand), aim, [UP, -fingers], search=True
+            )
             if way is None:
                 reason, detail = "no_path", f"the hand has no way to the button of {name}"
                 continue
@@ -77,14 +80,20 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
 def _plan(world: PlannedWorld, point: Vector, hand: int, attempt: int) -> tuple[Stance, Vector] | None:
     """A stance, and a point near a button that a hand has a way to; from there the fingers go to the button."""
     obstacles, floor = world.obstacles(), world.floor()
-    found = 0
-    for stance in world.stances(hand, point, floor, AWAY, most=STANCES):
-        fingers = ahead(stance.yaw)
-        for offset in (-fingers * (NEAR_BUTTON + FINGER), -DOWN * NEAR_BUTTON - fingers * FINGER):
-            aim = point + offset
-            rests = world.resting(hand, stance)
-            if hand_path(obstacles, world.spheres(fingers), rests, aim, [UP, -fingers]) is not None:
-                found += 1
-                if found > attempt:
-                    return stance, aim
-    return None
+    passed = 0
+
+    def candidates() -> Iterator[tuple[Stance, Vector]]:
+        for stance in world.stances(hand, point, floor, AWAY, most=STANCES):
+            fingers = ahead(stance.yaw)
+            yield stance, point - fingers * (NEAR_BUTTON + FINGER)
+            yield stance, point + NEAR_BUTTON * UP - fingers * FINGER
+
+    def has_way(candidate: tuple[Stance, Vector], search: bool) -> bool:
+        nonlocal passed
+        stance, aim = candidate
+        fingers, rests = ahead(stance.yaw), world.resting(hand, stance)
+        found = hand_path(obstacles, world.spheres(fingers), rests, aim, [UP, -fingers], search=search) is not None
+        passed += found
+        return found and passed > attempt
+
+    return first_way(candidates(), has_way, 2 * STANCES)

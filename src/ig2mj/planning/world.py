@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
@@ -42,6 +43,9 @@ APART = 0.12
 
 AWAY, FARTHEST = 0.55, 0.95
 """m, horizontal, that a base would like to be from what its hand does, and from where it puts what is large."""
+
+WALL = 0.02
+"""m before a point from which on a wall does not count: a switch is on it."""
 
 EACH = 3
 """Spots of a placement in each area of its rule."""
@@ -292,11 +296,28 @@ class PlannedWorld:
         cost = 0.6 * way + 2.0 * np.abs(apart - away) - 0.5 * np.minimum(floor.spare[tuple(cells.T)], 0.2)
         target = point if held is None else point + _turned_vectors(yaw, held)
         cost[~self._reach_from(hand, middles, yaw, target)] = np.inf
-        for _ in range(most):
-            if not len(cost) or not np.isfinite(cost[best := int(np.argmin(cost))]):
-                return
+        count, obstacles = 0, self.obstacles()
+        while len(cost) and np.isfinite(cost[best := int(np.argmin(cost))]):
+            if self._behind_wall(obstacles, middles[best], point):
+                cost[best] = np.inf
+                continue
             cost[np.linalg.norm(middles - middles[best], axis=1) < APART] = np.inf
             yield Stance((float(middles[best][0]), float(middles[best][1])), float(yaw[best]))
+            count += 1
+            if count == most:
+                return
+
+    def _behind_wall(self, obstacles: Obstacles, xy: Float[np.ndarray, "2"], point: Vector) -> bool:
+        """Whether a wall stands between a robot and a point."""
+        start = np.array([*xy, point[2]])
+        apart = float(np.linalg.norm(point - start))
+        way = (point - start)[None] / max(apart, 1e-9)
+        return any(obstacles.entries(start[None], way, wall)[0] < apart - WALL for wall in self._walls)
+
+    @functools.cached_property
+    def _walls(self) -> list[int]:
+        tables = self.domain.model.tables
+        return [o for o, c in enumerate(tables.object_categories) if c == "walls"]
 
     def _reach_from(
         self, hand: int, xy: Float[np.ndarray, "n 2"], yaw: Float[np.ndarray, "n"], point: Float[np.ndarray, "*n 3"]
