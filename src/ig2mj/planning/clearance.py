@@ -8,6 +8,7 @@ Axes: K pieces, N planes, M points.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import itertools
@@ -20,6 +21,9 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import PieceKind, SceneTables
+
+HELD = 0.02
+"""m: smaller spheres are points of what a hand holds, larger ones parts of the hand."""
 
 FAR = 0.3
 """m from a point beyond which pieces are not looked at: the distance is then this at least."""
@@ -114,6 +118,7 @@ class Obstacles:
         placed = (pieces or PlacedPieces(scene)).of(view, world)
         self.objects = scene.tables.piece_object
         self._keep = (self.objects >= 0) & ~np.isin(self.objects, list(without))
+        self._body: tuple[float, ...] | None = None
         self._normal, self._offset, self._low, self._high = placed.normal, placed.offset, placed.low, placed.high
 
     def distance(self, points: Float[np.ndarray, "M 3"]) -> Float[np.ndarray, "M"]:
@@ -125,9 +130,21 @@ class Obstacles:
         away = np.einsum("kni,mi->mkn", self._normal[near], points) - self._offset[near]
         return np.minimum(away.max(-1).min(-1), FAR)
 
+    def about(self, axis: Sequence[float] | np.ndarray, radius: float, height: float) -> Obstacles:
+        """The same with the upright body of a robot at x and y, up to a height, all m. Only what it holds keeps clear
+        of it, which are spheres smaller than `HELD`: its hands pass through it."""
+        other = copy.copy(self)
+        other._body = (*(float(v) for v in axis), radius, height)
+        return other
+
     def clear(self, spheres: Float[np.ndarray, "M 4"]) -> bool:
         """Whether no sphere (x, y, z, radius) enters a piece."""
         centre, radius = spheres[:, :3], spheres[:, 3:]
+        if self._body is not None:
+            x, y, wide, high = self._body
+            held = spheres[(spheres[:, 3] < HELD) & (spheres[:, 2] < high)]
+            if (np.hypot(held[:, 0] - x, held[:, 1] - y) < wide + held[:, 3]).any():
+                return False
         low, high = (centre - radius).min(0), (centre + radius).max(0)
         near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
         if not len(near):

@@ -12,7 +12,7 @@ from collections.abc import Generator
 import numpy as np
 
 from ig2mj.planning.motion_planner import NEAR_START, FreeFloor
-from ig2mj.planning.moves import Program
+from ig2mj.planning.moves import Program, rest
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.planning.world import PlannedWorld, Stance
@@ -22,6 +22,9 @@ BACK = np.arange(0.0, 1.25, 0.1)
 
 NEAR = 1.0
 """m from the middle of an object at which a base without hands is near it."""
+
+STRAYED = 0.15
+"""m from where an empty hand rests beyond which it goes back before the robot drives."""
 
 STEP = 0.1
 """m between stances at which what is held is checked."""
@@ -34,6 +37,9 @@ def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     turned = abs((yaw - stance.yaw + np.pi) % (2 * np.pi) - np.pi)
     if apart < 0.04 and turned < 0.1:
         return ""
+    for hand, name in enumerate(world.held):
+        if not name and np.linalg.norm(world.grip(hand) - world.resting(hand, world.stance)) > STRAYED:
+            yield rest(hand)
     standing = world.floor()
     if not any(n and not world.domain.fixed(n) for n in world.held):
         way = standing.way(here, stance.xy)

@@ -24,7 +24,7 @@ from ig2mj.planning.moves import (
 from ig2mj.planning.opening import open_into
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import PlannedWorld, Spot, Stance
+from ig2mj.planning.world import BODY, PlannedWorld, Spot, Stance
 
 SPARE = 0.03
 """m before its place from which on an object may touch what is around."""
@@ -64,7 +64,9 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             fingers, palm = world.hand_axes(hand, rotation)
             target = target + LET_GO * UP
             spheres = world.spheres(fingers, palm, holding=name, hand=hand, rotation=rotation)
-            way = hand_path(world.obstacles([name]), spheres, world.grip(hand), target, [UP, -ahead(yaw)], SPARE, True)
+            way = hand_path(
+                world.obstacles([name], world.stance), spheres, world.grip(hand), target, [UP, -ahead(yaw)], SPARE, True
+            )
             if way is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
@@ -113,6 +115,9 @@ def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int)
         target, _, rotation = world.grip_for(hand, name, spot)
         spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
         start, back = world.carried(hand, stance), [UP, -ahead(stance.yaw)]
-        return hand_path(obstacles, spheres, start, target + LET_GO * UP, back, SPARE, search) is not None
+        return (
+            hand_path(obstacles.about(stance.xy, *BODY), spheres, start, target + LET_GO * UP, back, SPARE, search)
+            is not None
+        )
 
     return first_way(candidates(), has_way, WAYS) or lacking

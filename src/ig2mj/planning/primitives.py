@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ig2mj.planning.bodies import WheeledBody
+from ig2mj.planning.cleaning import clean
 from ig2mj.planning.driving import drive_near, go
 from ig2mj.planning.grasping import grasp, release
 from ig2mj.planning.moves import Primitive, PrimitiveFailed
@@ -17,7 +18,7 @@ from ig2mj.planning.opening import set_open
 from ig2mj.planning.placing import place
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
-from ig2mj.planning.treatments import clean, cook, freeze, slice_, soak
+from ig2mj.planning.treatments import cook, freeze, slice_, soak
 from ig2mj.planning.world import AWAY, PlannedWorld
 
 

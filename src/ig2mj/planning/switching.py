@@ -46,7 +46,7 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
                 return Outcome(attempts=max(attempt, 1))
             button = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
             hand = free_hand(world, attempt)
-            found = _plan(world, button, hand, attempt)
+            found = _plan(world, button, hand, attempt, world.stance if name in world.held else None)
             if found is None:
                 reason, detail = "no_base", f"no free floor from which a hand reaches the button of {name}"
                 continue
@@ -77,13 +77,19 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
     return toggle
 
 
-def _plan(world: PlannedWorld, point: Vector, hand: int, attempt: int) -> tuple[Stance, Vector] | None:
-    """A stance, and a point near a button that a hand has a way to; from there the fingers go to the button."""
+def _plan(
+    world: PlannedWorld, point: Vector, hand: int, attempt: int, at: Stance | None
+) -> tuple[Stance, Vector] | None:
+    """A stance, and a point near a button that a hand has a way to; from there the fingers go to the button.
+
+    Args:
+      at: where the robot stays, since a hand holds what is switched; None: it may go anywhere.
+    """
     obstacles, floor = world.obstacles(), world.floor()
     passed = 0
 
     def candidates() -> Iterator[tuple[Stance, Vector]]:
-        for stance in world.stances(hand, point, floor, AWAY, most=STANCES):
+        for stance in world.stances(hand, point, floor, AWAY, most=STANCES) if at is None else [at]:
             fingers = ahead(stance.yaw)
             yield stance, point - fingers * (NEAR_BUTTON + FINGER)
             yield stance, point + NEAR_BUTTON * UP - fingers * FINGER

@@ -1,10 +1,8 @@
-"""Primitives in physics that change an object's state with a tool, water, heat or cold: wipe, scrub, soak, slice, cook,
-freeze.
-"""
+"""Primitives in physics that change an object's state with a knife, water, heat or cold: slice, soak, cook, freeze."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 
 import numpy as np
 
@@ -24,108 +22,8 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import AWAY, DirtSpot, PlannedWorld, Stance, Vector, about_vertical
+from ig2mj.planning.world import AWAY, BODY, PlannedWorld, Vector, about_vertical
 from ig2mj.scene.tables import LinkKind
-
-# Water, dirt, heat and cold.
-
-
-def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
-    """The primitive that takes dust or stains off an object with a tool that a hand holds."""
-
-    def clean(world: PlannedWorld, step: Step) -> Primitive:
-        name, tool = step.arguments
-        hand = hand_with(world, tool)
-        if predicate == "stained" and not world.facts.holds("soaked", tool):
-            return Outcome("no_grasp", f"{tool} is not soaked")
-        reason, detail, passed = "no_base", f"no dirt of {name} is in reach", set[int]()
-        for attempt in range(WIPES):
-            if not world.facts.holds(predicate, name):
-                return Outcome(attempts=attempt + 1)
-            if tool not in world.held:
-                return Outcome("slipped", f"the hand lost {tool}", attempts=attempt + 1)
-            spots = [spot for spot in world.dirt(predicate, name) if spot.number not in passed]
-            found = _plan_wipe(world, spots, tool, hand)
-            if found is None:
-                break
-            stance, chosen = found
-            if reason := (yield from go(world, stance)):
-                passed |= {spot.number for spot in chosen}
-                continue
-            program = _wipe_program(world, chosen, tool, hand)
-            passed |= {spot.number for spot in chosen}
-            if program:
-                reason = yield program
-                detail = f"the tool did not take enough off {name}"
-        yield [carry(world, hand)]
-        if not world.facts.holds(predicate, name):
-            return Outcome(attempts=WIPES)
-        return Outcome(reason or "not_true_after", detail, attempts=WIPES)
-
-    return clean
-
-
-WIPES, AT_ONCE, PRESSED, LIFTED, TOP = 8, 8, 0.02, 0.06, -0.3
-"""Rounds of wiping; particles of a round; m that a tool is pressed into a face, and lifted off it between particles;
-smallest z of the normal of a face that is wiped."""
-
-
-def _tool_box(world: PlannedWorld, tool: str, hand: int) -> tuple[Vector, Vector]:
-    """Middle of a held tool's box relative to the hand's grasp point, and its half size, m."""
-    corners = world.vertices(tool)
-    low, high = corners.min(0), corners.max(0)
-    return (low + high) / 2 - world.grip(hand), (high - low) / 2
-
-
-def _plan_wipe(
-    world: PlannedWorld, spots: Sequence[DirtSpot], tool: str, hand: int
-) -> tuple[Stance, list[DirtSpot]] | None:
-    """A stance from which particles are in reach, and these, the nearest first."""
-    offset, half = _tool_box(world, tool, hand)
-    floor = world.floor()
-    best: tuple[Stance, list[DirtSpot]] | None = None
-    for spot in [s for s in spots if s.normal[2] > TOP][:6]:
-        for stance in world.stances(hand, spot.pos, floor, AWAY, most=3):
-            here = np.array(stance.xy)
-            near = [
-                s
-                for s in spots
-                if s.normal[2] > TOP
-                and world.reaches(hand, stance, _at_spot(s, offset, half))
-                and (s.normal[2] > 0.5 or (here - s.pos[:2]) @ s.normal[:2] > 0)
-            ]
-            if near and (best is None or len(near) > len(best[1])):
-                best = stance, near
-    if best is None:
-        return None
-    stance, near = best
-    return stance, sorted(near, key=lambda s: float(np.linalg.norm(s.pos - spots[0].pos)))[:AT_ONCE]
-
-
-def _at_spot(spot: DirtSpot, offset: Vector, half: Vector) -> Vector:
-    """Grasp point of a hand whose tool presses on a particle."""
-    depth = float(np.abs(spot.normal) @ half)
-    return spot.pos + spot.normal * (depth - PRESSED) - offset
-
-
-def _wipe_program(world: PlannedWorld, spots: Sequence[DirtSpot], tool: str, hand: int) -> Program:
-    offset, half = _tool_box(world, tool, hand)
-    _, yaw = world.base
-    obstacles, spheres = world.obstacles([tool]), world.spheres(*world.hand_axes(hand))
-    keeps, at, program = world.index(tool), world.grip(hand), Program()
-    for spot in spots:
-        target = _at_spot(spot, offset, half)
-        before = target + LIFTED * spot.normal
-        way = hand_path(obstacles, spheres, at, before, [UP, -ahead(yaw)])
-        if way is None:
-            continue
-        program += travel(hand, way, None, keeps=keeps)
-        program += [
-            Phase(hand=hand, pos=vector3(target), keeps=keeps, tolerance=0.004, limit=6, after="", speed=0.04),
-            Phase(hand=hand, pos=vector3(before), keeps=keeps, tolerance=0.03, limit=12, after=""),
-        ]
-        at = before
-    return [*program, carry(world, hand, keeps)] if program else program
 
 
 def _wait(
@@ -161,7 +59,16 @@ def _hold_at(
             rotation = about_vertical(stance.yaw - now)
             target = point + rotation @ (world.grip(hand) - part())
             spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
-            if hand_path(obstacles, spheres, world.carried(hand, stance), target, [UP, -ahead(stance.yaw)]) is None:
+            if (
+                hand_path(
+                    obstacles.about(stance.xy, *BODY),
+                    spheres,
+                    world.carried(hand, stance),
+                    target,
+                    [UP, -ahead(stance.yaw)],
+                )
+                is None
+            ):
                 continue
             if reason := (yield from go(world, stance)):
                 _, now = world.base
@@ -169,7 +76,7 @@ def _hold_at(
             target = point - part() + world.grip(hand)
             spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
             entries = [UP, -ahead(world.base[1])]
-            way = hand_path(world.obstacles([name]), spheres, world.grip(hand), target, entries)
+            way = hand_path(world.obstacles([name], world.stance), spheres, world.grip(hand), target, entries)
             if way is None:
                 continue
             reason = yield travel(hand, way, None, keeps=world.index(name))

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
+from ig2mj.agents.humanoid.frames import BODY_HEIGHT
+from ig2mj.agents.humanoid.robot import BODY_RADIUS
 from ig2mj.engine.view import PhysicsView
-from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply
+from ig2mj.geometry.host_rotations import matrix_to_quat, quat_conjugate, quat_multiply
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.bodies import Senses, grip_of, sense
 from ig2mj.planning.clearance import Obstacles
@@ -35,11 +37,15 @@ behind the grasp point; of the fingers ahead of it."""
 HELD_POINTS, HELD_MARGIN = 60, 0.012
 """Points of what a hand holds that keep clear, and m by which they do."""
 
-BODY = 0.24
-"""m from the axis of the body that what is carried is away from."""
+BODY, BODY_SPARE = (BODY_RADIUS + 0.01, 2 * BODY_HEIGHT), 0.04
+"""m: radius and height of the body that what is held keeps clear of, and what is left between both when it is
+carried."""
 
 APART = 0.12
 """m between stances for the same point, at least."""
+
+RESTING = (0.56, 0.8, 0.33)
+"""m: heights of the hands at rest, and how far from the body's axis they reach."""
 
 AWAY, FARTHEST = 0.55, 0.95
 """m, horizontal, that a base would like to be from what its hand does, and from where it puts what is large."""
@@ -158,9 +164,16 @@ class PlannedWorld:
         """Centre of mass of an object."""
         return np.asarray(self.view.object_com)[self.world, self.index(name)].astype(float)
 
-    def obstacles(self, without: Collection[str] = ()) -> Obstacles:
-        """Pieces of everything but some objects."""
-        return self.planner.obstacles(self.view, [self.index(n) for n in without], self.world)
+    def obstacles(self, without: Collection[str] = (), at: Stance | None = None) -> Obstacles:
+        """Pieces of everything but some objects; `at`: and the robot's body, if it stood there."""
+        found = self.planner.obstacles(self.view, [self.index(n) for n in without], self.world)
+        return found if at is None else found.about(at.xy, *BODY)
+
+    @property
+    def stance(self) -> Stance:
+        """Where the robot stands now."""
+        (x, y), yaw = self.base
+        return Stance((float(x), float(y)), yaw)
 
     def vertices(self, name: str) -> Float[np.ndarray, "V 3"]:
         """Corners of an object's collision pieces, world frame."""
@@ -213,15 +226,19 @@ class PlannedWorld:
         Args:
           holding: in any direction with what it holds.
         """
-        view, number = self.view, self.world
+        view, number, hands = self.view, self.world, self.body.hands
         held = [n if n and not self.domain.fixed(n) else "" for n in self.held]
-        busy = [] if holding else [int(self.body.hands[h]) for h, name in enumerate(held) if name]
-        footprint = BaseFootprint.of_robot(self.stage.scene, view, self.stage.agent, number, busy)
+        footprint = BaseFootprint.of_robot(self.stage.scene, view, self.stage.agent, number, hands.tolist())
+        if not all(held):
+            footprint = footprint.holding(*RESTING)
         here, _ = self.base
-        for name in filter(None, held if holding else []):
-            corners = self.vertices(name)
-            away = float(np.linalg.norm(corners[:, :2] - here, axis=1).max())
-            footprint = footprint.holding(float(corners[:, 2].min()), float(corners[:, 2].max()), away)
+        for hand, name in enumerate(held):
+            if holding and name:
+                corners = np.concatenate(
+                    [self.vertices(name), hand_spheres(*self.hand_axes(hand))[:, :3] + self.grip(hand)]
+                )
+                away = float(np.linalg.norm(corners[:, :2] - here, axis=1).max())
+                footprint = footprint.holding(float(corners[:, 2].min()), float(corners[:, 2].max()), away)
         return self.planner.floor(view, footprint, without=[self.index(n) for n in held if n], world=number)
 
     def clear_with_held(self, stances: Sequence[Stance]) -> bool:
@@ -247,7 +264,7 @@ class PlannedWorld:
         x, y, z = self.body.carry[hand]
         if name := name or self.held[hand]:
             low, high = self.vertices(name).min(0), self.vertices(name).max(0)
-            x = max(x, BODY + float(np.linalg.norm((high - low)[:2])) / 2)
+            x = max(x, BODY[0] + BODY_SPARE + float(np.linalg.norm((high - low)[:2])) / 2)
         return np.array([x, y, z])
 
     def resting(self, hand: int, stance: Stance) -> Vector:
@@ -313,6 +330,11 @@ class PlannedWorld:
         apart = float(np.linalg.norm(point - start))
         way = (point - start)[None] / max(apart, 1e-9)
         return any(obstacles.entries(start[None], way, wall)[0] < apart - WALL for wall in self._walls)
+
+    def turned_hand(self, hand: int, rotation: Rotation) -> tuple[float, float, float, float]:
+        """Orientation of a hand, w-x-y-z, after a rotation."""
+        w, x, y, z = matrix_to_quat(rotation @ matrices_on_host(self.hand_quat(hand)[None])[0])
+        return (float(w), float(x), float(y), float(z))
 
     @functools.cached_property
     def _walls(self) -> list[int]:

@@ -1,0 +1,260 @@
+"""Wiping dust and scrubbing stains: a tool that a hand holds is pressed on particles, those next to each other in one
+stroke.
+
+A tool takes off all particles in the box of its cleaning area, or of itself, while it touches the object
+(`ig2mj.states.definitions.cleaning`). Positions of the tool are those that cover most of what is left.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.planning.clearance import Obstacles, straight
+from ig2mj.planning.driving import go
+from ig2mj.planning.grasping import grasp
+from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_path, hand_with, travel, vector3
+from ig2mj.planning.phases import Phase
+from ig2mj.planning.steps import Outcome, Step
+from ig2mj.planning.switching import toggle
+from ig2mj.planning.world import BODY, DirtSpot, PlannedWorld, Rotation, Stance, Vector, about_vertical
+
+ROUNDS, STROKES = 24, 8
+"""Stances from which an object is cleaned, and places of the tool for each, at most."""
+
+PRESSED, LIFTED, SLACK = 0.02, 0.06, 0.01
+"""m that a tool is pressed into a face, and is lifted off it; by which particles may be outside of its box."""
+
+LOWEST = -0.3
+"""Smallest z of the normal of a face that is cleaned."""
+
+NEAREST, STANCES = 6, 3
+"""Particles that stances are looked for, and stances for each."""
+
+SLIDE = 0.3
+"""m between places on one face up to which the tool is not lifted."""
+
+REGRASPS = 3
+"""Times that a tool which was lost is taken again."""
+
+FAR_AREA = 0.04
+"""m between a tool's middle and its cleaning area beyond which the area is turned to the face."""
+
+
+def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
+    """The primitive that takes dust or stains off an object with a tool that a hand holds."""
+
+    def clean(world: PlannedWorld, step: Step) -> Primitive:
+        name, tool = step.arguments
+        hand_with(world, tool)
+        if predicate == "stained" and not world.facts.holds("soaked", tool):
+            return Outcome("no_grasp", f"{tool} is not soaked")
+        if world.domain.has(tool, "toggleable") and not world.facts.holds("toggled_on", tool):
+            yield from toggle(True)(world, Step("toggle_on", (tool,)))
+        reason, detail, lost, passed = "no_base", f"no dirt of {name} is in reach", 0, set[int]()
+        for attempt in range(ROUNDS):
+            if not world.facts.holds(predicate, name):
+                break
+            if tool not in world.held:
+                lost += 1
+                again = None if lost > REGRASPS else (yield from grasp(world, Step("grasp", (tool,))))
+                if again is None or not again.done:
+                    return Outcome("slipped", f"the hand lost {tool}", attempts=attempt + 1)
+            hand = hand_with(world, tool)
+            spots = [spot for spot in world.dirt(predicate, name) if spot.number not in passed]
+            plan = _plan(world, tool, hand, spots)
+            if plan is None:
+                break
+            passed |= {spot.number for spot in plan.covered}
+            if failed := (yield from go(world, plan.stance)):
+                reason, detail = failed, f"no way leads to where the dirt of {name} is in reach"
+                continue
+            program = _program(world, tool, hand, plan)
+            if program:
+                reason, detail = (yield program), f"{tool} did not take enough off {name}"
+        if tool in world.held:
+            yield [carry(world, hand_with(world, tool))]
+        if not world.facts.holds(predicate, name):
+            return Outcome()
+        return Outcome(reason or "not_true_after", detail)
+
+    return clean
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Region:
+    """Where a held tool cleans: its box (m) from the hand's grasp point, when it is turned by `rotation`."""
+
+    rotation: Rotation
+    low: Vector
+    high: Vector
+
+    def at(self, spot: DirtSpot) -> Vector:
+        """Grasp point of the hand when the box is pressed on a particle."""
+        depth = float(np.abs(spot.normal) @ (self.high - self.low)) / 2
+        return spot.pos + spot.normal * (depth - PRESSED) - (self.low + self.high) / 2
+
+    def covers(self, grip: Vector, spots: Sequence[DirtSpot]) -> list[DirtSpot]:
+        low, high = grip + self.low - SLACK, grip + self.high + SLACK
+        return [s for s in spots if (low <= s.pos).all() and (s.pos <= high).all()]
+
+
+def _regions(world: PlannedWorld, tool: str, hand: int, stance: Stance, normal: Vector) -> list[_Region]:
+    """Turns of a tool with its box: with the cleaning area at its end towards the face; as it is carried."""
+    corners, area = _corners(world, tool)
+    points = corners - world.grip(hand)
+    carried = about_vertical(stance.yaw - world.base[1])
+    rotations = []
+    out = corners.mean(0) - world.com(tool)
+    if area and np.linalg.norm(out) > FAR_AREA:
+        rotations.append(_turn_onto(carried @ out, -normal) @ carried)
+    rotations.append(carried)
+    return [_Region(r, (points @ r.T).min(0), (points @ r.T).max(0)) for r in rotations]
+
+
+def _corners(world: PlannedWorld, tool: str) -> tuple[Float[np.ndarray, "V 3"], bool]:
+    """Corners of a tool's cleaning area, or of the whole tool where it has none, and whether it has one."""
+    p, tables = world.domain.model.parameters, world.domain.model.tables
+    number = np.flatnonzero(p.tool_object == world.index(tool))
+    link = int(p.tool_link[number[0]]) if len(number) else -1
+    if link < 0 or not (tables.link_half[link] > 0).any():
+        return world.vertices(tool), False
+    frame = matrices_on_host(np.asarray(world.view.link_quat)[world.world, [link]])[0]
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+    return np.asarray(world.view.link_pos)[world.world, link] + (signs * tables.link_half[link]) @ frame.T, True
+
+
+def _turn_onto(one: Vector, other: Vector) -> Rotation:
+    """The least rotation from one direction to another."""
+    a, b = one / np.linalg.norm(one), other / np.linalg.norm(other)
+    axis, cos = np.cross(a, b), float(a @ b)
+    if cos < -0.999:
+        side = np.cross(a, UP) if abs(a @ UP) < 0.9 else np.array([1.0, 0.0, 0.0])
+        side = side / np.linalg.norm(side)
+        return 2 * np.outer(side, side) - np.eye(3)
+    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + k + k @ k / (1 + cos)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _CleanPlan:
+    """From where, with which of the tool's turns, particles are pressed on one after another; `covered`: all that this
+    takes off."""
+
+    stance: Stance
+    turn: int
+    strokes: list[DirtSpot]
+    covered: list[DirtSpot]
+
+
+def _plan(world: PlannedWorld, tool: str, hand: int, spots: Sequence[DirtSpot]) -> _CleanPlan | None:
+    """The stance from which most particles are in reach, of those near the nearest ones."""
+    floor, obstacles = world.floor(), world.obstacles([tool])
+    spots = [s for s in spots if s.normal[2] > LOWEST]
+    away = world.away(world.spheres(*world.hand_axes(hand), holding=tool, hand=hand))
+    best: _CleanPlan | None = None
+    for aim in spots[:NEAREST]:
+        for stance in world.stances(hand, aim.pos + PRESSED * aim.normal, floor, away, STANCES):
+            for turn, region in enumerate(_regions(world, tool, hand, stance, aim.normal)):
+                standing, start = obstacles.about(stance.xy, *BODY), world.carried(hand, stance)
+                clear = _room(standing, _spheres(world, tool, hand, region))
+                plan = _strokes(world, hand, stance, turn, region, spots, clear)
+                if plan is None or (best is not None and len(plan.covered) <= len(best.covered)):
+                    continue
+                if _way(world, tool, hand, standing, stance.yaw, region, start, plan.strokes[0]) is not None:
+                    best = plan
+    return best
+
+
+def _room(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"]) -> Callable[[Vector], bool]:
+    """Whether the hand with the tool has room at a point."""
+    return lambda at: obstacles.clear(np.column_stack([spheres[:, :3] + at, spheres[:, 3]]))
+
+
+def _strokes(
+    world: PlannedWorld,
+    hand: int,
+    stance: Stance,
+    turn: int,
+    region: _Region,
+    spots: Sequence[DirtSpot],
+    clear: Callable[[Vector], bool],
+) -> _CleanPlan | None:
+    """Places of the tool that cover most particles in reach from a stance, each next to the one before; `clear`: the
+    hand has room there."""
+    here = np.array(stance.xy)
+    near = [
+        s
+        for s in spots
+        if world.reaches(hand, stance, region.at(s))
+        and (s.normal[2] > 0.5 or (here - s.pos[:2]) @ s.normal[:2] > 0)
+        and clear(region.at(s) + LIFTED * s.normal)
+    ]
+    left, strokes, covered = list(near), [], []
+    while left and len(strokes) < STROKES:
+        sets = [region.covers(region.at(s), left) for s in left]
+        best = int(np.argmax([len(c) for c in sets]))
+        gone = {s.number for s in sets[best]} | {left[best].number}
+        strokes.append(left[best])
+        covered += [s for s in left if s.number in gone]
+        left = [s for s in left if s.number not in gone]
+    if not strokes:
+        return None
+    ordered = [strokes.pop(0)]
+    while strokes:
+        nearest = int(np.argmin([np.linalg.norm(s.pos - ordered[-1].pos) for s in strokes]))
+        ordered.append(strokes.pop(nearest))
+    return _CleanPlan(stance, turn, ordered, covered)
+
+
+def _spheres(world: PlannedWorld, tool: str, hand: int, region: _Region) -> Float[np.ndarray, "S 4"]:
+    axes = world.hand_axes(hand, region.rotation)
+    return world.spheres(*axes, holding=tool, hand=hand, rotation=region.rotation)
+
+
+def _way(
+    world: PlannedWorld,
+    tool: str,
+    hand: int,
+    obstacles: Obstacles,
+    yaw: float,
+    region: _Region,
+    start: Vector,
+    spot: DirtSpot,
+) -> list[Vector] | None:
+    """The hand's way to above a particle; None: there is none."""
+    return hand_path(
+        obstacles, _spheres(world, tool, hand, region), start, region.at(spot) + LIFTED * spot.normal, [UP, -ahead(yaw)]
+    )
+
+
+def _program(world: PlannedWorld, tool: str, hand: int, plan: _CleanPlan) -> Program:
+    """Presses the tool on each particle; between those of one face that are near each other it slides."""
+    obstacles, stance, keeps = world.obstacles([tool], world.stance), world.stance, world.index(tool)
+    regions = _regions(world, tool, hand, stance, plan.strokes[0].normal)
+    region = regions[min(plan.turn, len(regions) - 1)]
+    quat = world.turned_hand(hand, region.rotation)
+    at, program, before, spheres = world.grip(hand), Program(), None, _spheres(world, tool, hand, region)
+    for spot in plan.strokes:
+        target = region.at(spot)
+        near = before is not None and float(np.linalg.norm(spot.pos - before.pos)) < SLIDE
+        above = target + LIFTED * spot.normal
+        slides = before is not None and near and spot.normal @ before.normal > 0.9
+        if not slides or not straight(obstacles, spheres, at, above):
+            way = _way(world, tool, hand, obstacles, stance.yaw, region, at, spot)
+            if way is None:
+                continue
+            if before is not None:
+                program.append(Phase(hand=hand, pos=vector3(at), keeps=keeps, tolerance=0.03, limit=12, after=""))
+            program += travel(hand, way, quat, keeps=keeps)
+        program.append(Phase(hand=hand, pos=vector3(target), quat=quat, keeps=keeps, tolerance=0.005, limit=8, after="",
+                             speed=0.03))  # fmt: skip
+        at, before = above, spot
+    if before is None:
+        return program
+    up = Phase(hand=hand, pos=vector3(at), keeps=keeps, tolerance=0.03, limit=12, after="")
+    return [*program, up, carry(world, hand, keeps)]
