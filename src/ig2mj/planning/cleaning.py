@@ -1,5 +1,4 @@
-"""Wiping dust and scrubbing stains: a tool that a hand holds is pressed on particles, those next to each other in one
-stroke.
+"""Wiping dust and scrubbing stains: a tool that a hand holds is pressed on particles, one place after another.
 
 A tool takes off all particles in the box of its cleaning area, or of itself, while it touches the object
 (`ig2mj.states.definitions.cleaning`). Positions of the tool are those that cover most of what is left.
@@ -14,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.clearance import Obstacles, straight
+from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp
 from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_path, hand_with, travel, vector3
@@ -34,9 +33,6 @@ LOWEST = -0.3
 
 NEAREST, STANCES = 6, 3
 """Particles that stances are looked for, and stances for each."""
-
-SLIDE = 0.3
-"""m between places on one face up to which the tool is not lifted."""
 
 REGRASPS = 3
 """Times that a tool which was lost is taken again."""
@@ -69,13 +65,16 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             plan = _plan(world, tool, hand, spots)
             if plan is None:
                 break
-            passed |= {spot.number for spot in plan.covered}
             if failed := (yield from go(world, plan.stance)):
                 reason, detail = failed, f"no way leads to where the dirt of {name} is in reach"
+                passed |= {spot.number for spot in plan.covered}
                 continue
-            program = _program(world, tool, hand, plan)
-            if program:
-                reason, detail = (yield program), f"{tool} did not take enough off {name}"
+            for stroke in plan.strokes:
+                passed |= {spot.number for spot in stroke}
+                if not world.facts.holds(predicate, name) or tool not in world.held:
+                    break
+                if program := _program(world, tool, hand, plan, stroke[0]):
+                    reason, detail = (yield program), f"{tool} did not take enough off {name}"
         if tool in world.held:
             yield [carry(world, hand_with(world, tool))]
         if not world.facts.holds(predicate, name):
@@ -142,13 +141,16 @@ def _turn_onto(one: Vector, other: Vector) -> Rotation:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _CleanPlan:
-    """From where, with which of the tool's turns, particles are pressed on one after another; `covered`: all that this
-    takes off."""
+    """From where, and with which of its turns, a tool is pressed on particles one after another; each of `strokes` is
+    that one, and the others that it takes off with it."""
 
     stance: Stance
     turn: int
-    strokes: list[DirtSpot]
-    covered: list[DirtSpot]
+    strokes: list[list[DirtSpot]]
+
+    @property
+    def covered(self) -> list[DirtSpot]:
+        return [spot for stroke in self.strokes for spot in stroke]
 
 
 def _plan(world: PlannedWorld, tool: str, hand: int, spots: Sequence[DirtSpot]) -> _CleanPlan | None:
@@ -165,7 +167,7 @@ def _plan(world: PlannedWorld, tool: str, hand: int, spots: Sequence[DirtSpot]) 
                 plan = _strokes(world, hand, stance, turn, region, spots, clear)
                 if plan is None or (best is not None and len(plan.covered) <= len(best.covered)):
                     continue
-                if _way(world, tool, hand, standing, stance.yaw, region, start, plan.strokes[0]) is not None:
+                if _way(world, tool, hand, standing, stance.yaw, region, start, plan.strokes[0][0]) is not None:
                     best = plan
     return best
 
@@ -194,21 +196,23 @@ def _strokes(
         and (s.normal[2] > 0.5 or (here - s.pos[:2]) @ s.normal[:2] > 0)
         and clear(region.at(s) + LIFTED * s.normal)
     ]
-    left, strokes, covered = list(near), [], []
+    left, strokes = list(near), []
     while left and len(strokes) < STROKES:
         sets = [region.covers(region.at(s), left) for s in left]
         best = int(np.argmax([len(c) for c in sets]))
-        gone = {s.number for s in sets[best]} | {left[best].number}
-        strokes.append(left[best])
-        covered += [s for s in left if s.number in gone]
-        left = [s for s in left if s.number not in gone]
+        gone = {s.number for s in sets[best]} - {left[best].number}
+        strokes.append([left[best], *(s for s in left if s.number in gone)])
+        left = [s for s in left if s.number not in gone and s is not strokes[-1][0]]
     if not strokes:
         return None
+    strokes.sort(key=lambda stroke: (stroke[0].normal[2] < 0.5, -round(float(stroke[0].pos[2]), 1)))
     ordered = [strokes.pop(0)]
-    while strokes:
-        nearest = int(np.argmin([np.linalg.norm(s.pos - ordered[-1].pos) for s in strokes]))
-        ordered.append(strokes.pop(nearest))
-    return _CleanPlan(stance, turn, ordered, covered)
+    while strokes:  # the upper sides first, from one place to the next
+        level = [s for s in strokes if abs(s[0].pos[2] - strokes[0][0].pos[2]) < 0.1]
+        nearest = min(level, key=lambda s: float(np.linalg.norm(s[0].pos - ordered[-1][0].pos)))
+        strokes.remove(nearest)
+        ordered.append(nearest)
+    return _CleanPlan(stance, turn, ordered)
 
 
 def _spheres(world: PlannedWorld, tool: str, hand: int, region: _Region) -> Float[np.ndarray, "S 4"]:
@@ -232,29 +236,17 @@ def _way(
     )
 
 
-def _program(world: PlannedWorld, tool: str, hand: int, plan: _CleanPlan) -> Program:
-    """Presses the tool on each particle; between those of one face that are near each other it slides."""
+def _program(world: PlannedWorld, tool: str, hand: int, plan: _CleanPlan, spot: DirtSpot) -> Program:
+    """Presses the tool on a particle and lifts it; nothing where the hand has no way there."""
     obstacles, stance, keeps = world.obstacles([tool], world.stance), world.stance, world.index(tool)
-    regions = _regions(world, tool, hand, stance, plan.strokes[0].normal)
+    regions = _regions(world, tool, hand, stance, spot.normal)
     region = regions[min(plan.turn, len(regions) - 1)]
-    quat = world.turned_hand(hand, region.rotation)
-    at, program, before, spheres = world.grip(hand), Program(), None, _spheres(world, tool, hand, region)
-    for spot in plan.strokes:
-        target = region.at(spot)
-        near = before is not None and float(np.linalg.norm(spot.pos - before.pos)) < SLIDE
-        above = target + LIFTED * spot.normal
-        slides = before is not None and near and spot.normal @ before.normal > 0.9
-        if not slides or not straight(obstacles, spheres, at, above):
-            way = _way(world, tool, hand, obstacles, stance.yaw, region, at, spot)
-            if way is None:
-                continue
-            if before is not None:
-                program.append(Phase(hand=hand, pos=vector3(at), keeps=keeps, tolerance=0.03, limit=12, after=""))
-            program += travel(hand, way, quat, keeps=keeps)
-        program.append(Phase(hand=hand, pos=vector3(target), quat=quat, keeps=keeps, tolerance=0.005, limit=8, after="",
-                             speed=0.03))  # fmt: skip
-        at, before = above, spot
-    if before is None:
-        return program
-    up = Phase(hand=hand, pos=vector3(at), keeps=keeps, tolerance=0.03, limit=12, after="")
-    return [*program, up, carry(world, hand, keeps)]
+    way = _way(world, tool, hand, obstacles, stance.yaw, region, world.grip(hand), spot)
+    if way is None:
+        return []
+    quat, target = world.turned_hand(hand, region.rotation), region.at(spot)
+    return [
+        *travel(hand, way, quat, keeps=keeps),
+        Phase(hand=hand, pos=vector3(target), quat=quat, keeps=keeps, tolerance=0.004, limit=8, after="", speed=0.03),
+        Phase(hand=hand, pos=vector3(way[-1]), keeps=keeps, tolerance=0.03, limit=12, after=""),
+    ]
