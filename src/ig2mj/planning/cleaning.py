@@ -6,6 +6,7 @@ A tool takes off all particles in the box of its cleaning area, or of itself, wh
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 from collections.abc import Callable, Sequence
 
@@ -16,6 +17,7 @@ from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp
+from ig2mj.planning.handing_over import hand_over
 from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_path, hand_with, travel, vector3
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.steps import Outcome, Step
@@ -28,17 +30,26 @@ ROUNDS, STROKES = 24, 8
 PRESSED, LIFTED, SLACK = 0.02, 0.06, 0.01
 """m that a tool is pressed into a face, and is lifted off it; by which particles may be outside of its box."""
 
+PRESSES = 4
+"""Agent steps that a tool is pressed: with each the hand is pulled farther into the face."""
+
+RAISED = 0.25
+"""m that a tool is lifted before the hand goes back to where it carries it."""
+
 LOWEST = -0.3
 """Smallest z of the normal of a face that is cleaned."""
 
-NEAREST, STANCES = 6, 3
-"""Particles that stances are looked for, and stances for each."""
+NEAREST, STANCES, FEW = 8, 3, 4
+"""Particles that stances are looked for, stances for each, and strokes of each of which one has to have a way."""
+
+TRIES = 3
+"""Times that a particle is gone for."""
 
 REGRASPS = 3
 """Times that a tool which was lost is taken again."""
 
-FAR_AREA = 0.04
-"""m between a tool's middle and its cleaning area beyond which the area is turned to the face."""
+COVERED = 0.5
+"""Cosine of the angle between where the hand is and where the cleaning area faces, above which the hand covers it."""
 
 
 def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
@@ -51,7 +62,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             return Outcome("no_grasp", f"{tool} is not soaked")
         if world.domain.has(tool, "toggleable") and not world.facts.holds("toggled_on", tool):
             yield from toggle(True)(world, Step("toggle_on", (tool,)))
-        reason, detail, lost, passed = "no_base", f"no dirt of {name} is in reach", 0, set[int]()
+        reason, detail, lost, tried = "no_base", f"no dirt of {name} is in reach", 0, collections.Counter[int]()
         for attempt in range(ROUNDS):
             if not world.facts.holds(predicate, name):
                 break
@@ -61,22 +72,32 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 if again is None or not again.done:
                     return Outcome("slipped", f"the hand lost {tool}", attempts=attempt + 1)
             hand = hand_with(world, tool)
-            spots = [spot for spot in world.dirt(predicate, name) if spot.number not in passed]
+            if _is_covered(world, tool, hand):
+                if all(world.held):
+                    return Outcome("no_grasp", f"the hand covers the side of {tool} that cleans, and none is free")
+                if failed := (yield from hand_over(world, tool, hand)):
+                    reason, detail = failed, f"{tool} cannot be taken by the side that does not clean"
+                    continue
+                hand = hand_with(world, tool)
+            spots = [spot for spot in world.dirt(predicate, name) if tried[spot.number] < TRIES]
+            spots.sort(key=lambda spot: tried[spot.number])
             plan = _plan(world, tool, hand, spots)
             if plan is None:
                 break
             if failed := (yield from go(world, plan.stance)):
                 reason, detail = failed, f"no way leads to where the dirt of {name} is in reach"
-                passed |= {spot.number for spot in plan.covered}
+                tried.update(spot.number for spot in plan.covered)
                 continue
             for stroke in plan.strokes:
-                passed |= {spot.number for spot in stroke}
+                tried.update(spot.number for spot in stroke)
                 if not world.facts.holds(predicate, name) or tool not in world.held:
                     break
                 if program := _program(world, tool, hand, plan, stroke[0]):
                     reason, detail = (yield program), f"{tool} did not take enough off {name}"
         if tool in world.held:
-            yield [carry(world, hand_with(world, tool))]
+            hand = hand_with(world, tool)
+            up = vector3(world.grip(hand) + RAISED * UP)
+            yield [Phase(hand=hand, pos=up, tolerance=0.04, limit=15, after=""), carry(world, hand)]
         if not world.facts.holds(predicate, name):
             return Outcome()
         return Outcome(reason or "not_true_after", detail)
@@ -103,28 +124,35 @@ class _Region:
 
 
 def _regions(world: PlannedWorld, tool: str, hand: int, stance: Stance, normal: Vector) -> list[_Region]:
-    """Turns of a tool with its box: with the cleaning area at its end towards the face; as it is carried."""
-    corners, area = _corners(world, tool)
-    points = corners - world.grip(hand)
+    """Turns of a tool with its box: with its cleaning area towards the face; as it is carried."""
+    area, out = _area(world, tool)
+    points = (world.vertices(tool) if area is None else area) - world.grip(hand)
     carried = about_vertical(stance.yaw - world.base[1])
-    rotations = []
-    out = corners.mean(0) - world.com(tool)
-    if area and np.linalg.norm(out) > FAR_AREA:
-        rotations.append(_turn_onto(carried @ out, -normal) @ carried)
-    rotations.append(carried)
+    rotations = [carried] if area is None else [_turn_onto(carried @ out, -normal) @ carried, carried]
     return [_Region(r, (points @ r.T).min(0), (points @ r.T).max(0)) for r in rotations]
 
 
-def _corners(world: PlannedWorld, tool: str) -> tuple[Float[np.ndarray, "V 3"], bool]:
-    """Corners of a tool's cleaning area, or of the whole tool where it has none, and whether it has one."""
+def _area(world: PlannedWorld, tool: str) -> tuple[Float[np.ndarray, "8 3"] | None, Vector]:
+    """Corners of a tool's cleaning area, and the direction out of the tool that it faces: along its thinnest side, away
+    from the middle; no corners, where the whole tool cleans."""
     p, tables = world.domain.model.parameters, world.domain.model.tables
     number = np.flatnonzero(p.tool_object == world.index(tool))
     link = int(p.tool_link[number[0]]) if len(number) else -1
     if link < 0 or not (tables.link_half[link] > 0).any():
-        return world.vertices(tool), False
+        return None, UP
+    half = tables.link_half[link]
     frame = matrices_on_host(np.asarray(world.view.link_quat)[world.world, [link]])[0]
+    middle = np.asarray(world.view.link_pos)[world.world, link].astype(float)
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-    return np.asarray(world.view.link_pos)[world.world, link] + (signs * tables.link_half[link]) @ frame.T, True
+    axis, corners = frame[:, int(np.argmin(half))], world.vertices(tool)
+    away = (middle - (corners.min(0) + corners.max(0)) / 2) @ axis
+    return middle + (signs * half) @ frame.T, axis * (1.0 if away >= 0 else -1.0)
+
+
+def _is_covered(world: PlannedWorld, tool: str, hand: int) -> bool:
+    """Whether the hand is on the side of a tool that cleans."""
+    area, out = _area(world, tool)
+    return area is not None and float(world.hand_axes(hand)[1] @ out) < -COVERED
 
 
 def _turn_onto(one: Vector, other: Vector) -> Rotation:
@@ -167,7 +195,10 @@ def _plan(world: PlannedWorld, tool: str, hand: int, spots: Sequence[DirtSpot]) 
                 plan = _strokes(world, hand, stance, turn, region, spots, clear)
                 if plan is None or (best is not None and len(plan.covered) <= len(best.covered)):
                     continue
-                if _way(world, tool, hand, standing, stance.yaw, region, start, plan.strokes[0][0]) is not None:
+                yaw = stance.yaw
+                if any(
+                    _way(world, tool, hand, standing, yaw, region, start, stroke[0]) for stroke in plan.strokes[:FEW]
+                ):
                     best = plan
     return best
 
@@ -229,6 +260,7 @@ def _way(
     region: _Region,
     start: Vector,
     spot: DirtSpot,
+    search: bool = False,
 ) -> list[Vector] | None:
     """The hand's way to above a particle; None: there is none."""
     return hand_path(
@@ -241,12 +273,14 @@ def _program(world: PlannedWorld, tool: str, hand: int, plan: _CleanPlan, spot: 
     obstacles, stance, keeps = world.obstacles([tool], world.stance), world.stance, world.index(tool)
     regions = _regions(world, tool, hand, stance, spot.normal)
     region = regions[min(plan.turn, len(regions) - 1)]
-    way = _way(world, tool, hand, obstacles, stance.yaw, region, world.grip(hand), spot)
+    way = _way(world, tool, hand, obstacles, stance.yaw, region, world.grip(hand), spot, search=True)
     if way is None:
         return []
     quat, target = world.turned_hand(hand, region.rotation), region.at(spot)
     return [
         *travel(hand, way, quat, keeps=keeps),
-        Phase(hand=hand, pos=vector3(target), quat=quat, keeps=keeps, tolerance=0.004, limit=8, after="", speed=0.03),
+        Phase(
+            hand=hand, pos=vector3(target), quat=quat, keeps=keeps, tolerance=0.004, limit=PRESSES, after="", speed=0.03
+        ),
         Phase(hand=hand, pos=vector3(way[-1]), keeps=keeps, tolerance=0.03, limit=12, after=""),
     ]

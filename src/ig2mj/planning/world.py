@@ -267,6 +267,10 @@ class PlannedWorld:
             x = max(x, BODY[0] + BODY_SPARE + float(np.linalg.norm((high - low)[:2])) / 2)
         return np.array([x, y, z])
 
+    def from_body(self, point: Vector) -> Vector:
+        """A point of the body's frame, where the robot stands now; world frame."""
+        return self._from(point, self.stance)
+
     def resting(self, hand: int, stance: Stance) -> Vector:
         """Where an empty hand's grasp point rests, if the robot stood there; world frame."""
         return self._from(self.body.rest[hand], stance)
