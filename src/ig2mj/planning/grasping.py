@@ -41,8 +41,7 @@ def grasp(world: PlannedWorld, step: Step) -> Primitive:
     name = step.object
     if name in world.held:
         return Outcome()
-    tables, index = world.domain.model.tables, world.index(name)
-    if not ((tables.graspable_object == index) & (tables.graspable_joint < 0)).any():
+    if not is_graspable(world, name):
         return Outcome("no_grasp", f"{name} is fixed, or its category allows no assisted grasp")
     reason, detail, tried = "no_grasp", "", list[GraspPose]()
     for attempt in range(ATTEMPTS):
@@ -61,6 +60,12 @@ def grasp(world: PlannedWorld, step: Step) -> Primitive:
         if name in world.held:
             return Outcome(attempts=attempt + 1)
     return Outcome(reason or "no_grasp", detail, attempts=ATTEMPTS)
+
+
+def is_graspable(world: PlannedWorld, name: str) -> bool:
+    """Whether hands take hold of an object."""
+    tables = world.domain.model.tables
+    return bool(((tables.graspable_object == world.index(name)) & (tables.graspable_joint < 0)).any())
 
 
 def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generator[Program, str, tuple[str, str]]:

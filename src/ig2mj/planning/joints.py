@@ -33,7 +33,7 @@ class OpenableJoint:
       name: of the joint. object, object_index: whose it is. hinge: it turns; else it slides.
       anchor, axis: of the hinge; the slide's axis. now, closed, open: positions. vertices: corners of the link.
       grips: points of the face that moves ahead when it opens, with its normal, the best first. edges: of the side of
-        a door that is farthest from its hinge.
+        a door that is farthest from its hinge, or of the faces along which something slides.
     """
 
     name: str
@@ -134,7 +134,8 @@ def _grips(joint: OpenableJoint) -> tuple[tuple[FaceGrip, ...], tuple[FaceGrip, 
         normal = sign * joint.axis
         across = [v for v in np.eye(3) if abs(v @ normal) < 0.7]
         face = middle + (((vertices - middle) @ normal).max()) * normal
-        return tuple((face + s * a * 0.25 * np.ptp(vertices @ a), normal) for a in across for s in (0, 1, -1)), ()
+        grips = tuple((face + s * a * 0.25 * np.ptp(vertices @ a), normal) for a in across for s in (0, 1, -1))
+        return grips, _side_grips(joint, middle)
     radial = vertices - joint.anchor
     radial -= np.outer(radial @ joint.axis, joint.axis)
     farthest = radial[np.argmax(np.linalg.norm(radial, axis=1))]
@@ -158,6 +159,16 @@ def _grips(joint: OpenableJoint) -> tuple[tuple[FaceGrip, ...], tuple[FaceGrip, 
         return max(HEIGHTS[0] - z, 0.0) + max(z - HEIGHTS[1], 0.0)
 
     return tuple(sorted(grips, key=discomfort)), tuple(sorted(edges, key=discomfort))
+
+
+def _side_grips(joint: OpenableJoint, middle: Vector) -> tuple[FaceGrip, ...]:
+    """Middles of the largest upright faces along which what slides moves, as of a window's sash."""
+    sides = [v for v in np.eye(3)[:2] if abs(v @ joint.axis) < 0.7]
+    if not sides:
+        return ()
+    thin = min(sides, key=lambda v: float(np.ptp(joint.vertices @ v)))
+    depth = (joint.vertices - middle) @ thin
+    return (middle + float(depth.max()) * thin, thin), (middle + float(depth.min()) * thin, -thin)
 
 
 def _about(axis: Vector, angle: float) -> Float[np.ndarray, "3 3"]:

@@ -137,7 +137,9 @@ def _ways(joint: OpenableJoint, value: bool) -> list[tuple[tuple[FaceGrip, ...],
     if value:
         return [(joint.grips, OPEN_TO, True), (joint.edges, OPEN_TO, True), (joint.inner_grips, OPEN_TO, False)]
     ways = [(joint.grips, 0.0, False)]
-    if joint.fraction > LAST + 0.1:
+    if not joint.hinge:
+        ways.append((joint.edges, 0.0, True))
+    elif joint.fraction > LAST + 0.1:
         ways.append((joint.edges, LAST, True))
     if joint.hinge and joint.fraction > AJAR + 0.1:
         ways.append((joint.inner_grips, AJAR, True))

@@ -33,8 +33,8 @@ STANCES, WAYS = 4, 60
 """Stances for each spot, and ways of a hand that are looked for, at most."""
 
 
-def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
-    """The primitive that makes a placement true."""
+def place(predicate: str, until: str = "") -> Callable[[PlannedWorld, Step], Primitive]:
+    """The primitive that makes a placement true; `until`: the relation that ends it, if it is another."""
 
     def place(world: PlannedWorld, step: Step) -> Primitive:
         name, where = step.arguments
@@ -83,7 +83,7 @@ def place(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 *rest(hand),
                 Phase(until=Until.WAITED, limit=6),
             ]  # fmt: skip
-            if world.facts.holds(predicate, name, where):
+            if world.facts.holds(until or predicate, name, where):
                 return Outcome(attempts=attempt + 1)
             reason, detail = reason or "not_true_after", f"{name} is not where it was put"
         return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)

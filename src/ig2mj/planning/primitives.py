@@ -16,6 +16,7 @@ from ig2mj.planning.grasping import grasp, release
 from ig2mj.planning.moves import Primitive, PrimitiveFailed
 from ig2mj.planning.opening import set_open
 from ig2mj.planning.placing import place
+from ig2mj.planning.pushing import push
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
 from ig2mj.planning.treatments import cook, freeze, slice_, soak
@@ -24,15 +25,7 @@ from ig2mj.planning.world import AWAY, PlannedWorld
 
 def primitive(world: PlannedWorld, step: Step) -> Primitive:
     """What a robot does for a step."""
-    action = ACTIONS.get(step.primitive)
-    if action is None:
-        return _refused(f"'{step.primitive}' is not carried out in physics; take --rung symbolic")
-    return _guarded(action(world, step))
-
-
-def _refused(detail: str) -> Primitive:
-    yield from ()
-    return Outcome("no_path", detail)
+    return _guarded(ACTIONS[step.primitive](world, step))
 
 
 def _guarded(inner: Primitive) -> Primitive:
@@ -74,5 +67,6 @@ ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {
     "slice": slice_,
     "cook": cook,
     "freeze": freeze,
+    "push": push,
 }
 """Primitives that are carried out in physics."""

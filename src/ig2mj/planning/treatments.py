@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ig2mj.planning.moves import (
     Program,
     ahead,
     carry,
+    first_way,
     hand_path,
     hand_with,
     travel,
@@ -22,7 +23,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import AWAY, BODY, PlannedWorld, Vector, about_vertical
+from ig2mj.planning.world import AWAY, BODY, PlannedWorld, Stance, Vector, about_vertical
 from ig2mj.scene.tables import LinkKind
 
 
@@ -51,37 +52,42 @@ def _hold_at(
     def part() -> Vector:
         return world.com(name) if link < 0 else np.asarray(world.view.link_pos)[world.world, link].astype(float)
 
-    for point in points:
-        obstacles, floor = world.obstacles([name]), world.floor()
-        _, now = world.base
-        held = about_vertical(-now) @ (world.grip(hand) - part())
-        for stance in world.stances(hand, point, floor, AWAY, held=held):
+    for _ in range(ATTEMPTS):
+        obstacles, floor, now = world.obstacles([name]), world.floor(), world.base[1]
+        offset = world.grip(hand) - part()
+        held = about_vertical(-now) @ offset
+
+        def candidates(floor=floor, held=held) -> Iterator[tuple[Stance, Vector]]:
+            for point in points:
+                yield from ((stance, point) for stance in world.stances(hand, point, floor, AWAY, STANCES, held))
+
+        def has_way(
+            candidate: tuple[Stance, Vector], search: bool, obstacles=obstacles, now=now, offset=offset
+        ) -> bool:
+            stance, point = candidate
             rotation = about_vertical(stance.yaw - now)
-            target = point + rotation @ (world.grip(hand) - part())
             spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
-            if (
-                hand_path(
-                    obstacles.about(stance.xy, *BODY),
-                    spheres,
-                    world.carried(hand, stance),
-                    target,
-                    [UP, -ahead(stance.yaw)],
-                )
-                is None
-            ):
-                continue
-            if reason := (yield from go(world, stance)):
-                _, now = world.base
-                continue
-            target = point - part() + world.grip(hand)
-            spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
-            entries = [UP, -ahead(world.base[1])]
-            way = hand_path(world.obstacles([name], world.stance), spheres, world.grip(hand), target, entries)
-            if way is None:
-                continue
-            reason = yield travel(hand, way, None, keeps=world.index(name))
-            return reason, way
+            standing, start = obstacles.about(stance.xy, *BODY), world.carried(hand, stance)
+            back = [UP, -ahead(stance.yaw)]
+            return hand_path(standing, spheres, start, point + rotation @ offset, back, search=search) is not None
+
+        found = first_way(candidates(), has_way, WAYS)
+        if found is None:
+            return "no_path", []
+        stance, point = found
+        if (yield from go(world, stance)):
+            continue
+        target = point - part() + world.grip(hand)
+        spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
+        back, obstacles = [UP, -ahead(world.base[1])], world.obstacles([name], world.stance)
+        way = hand_path(obstacles, spheres, world.grip(hand), target, back, search=True)
+        if way is not None:
+            return (yield travel(hand, way, None, keeps=world.index(name))), way
     return "no_path", []
+
+
+STANCES, WAYS = 6, 48
+"""Stances for each point, and ways of a hand that are looked for, at most."""
 
 
 def soak(world: PlannedWorld, step: Step) -> Primitive:
@@ -95,7 +101,7 @@ def soak(world: PlannedWorld, step: Step) -> Primitive:
     here, _ = world.base
     back = np.array([*(here - source[:2]), 0.0])
     back /= max(float(np.linalg.norm(back)), 1e-6)
-    points = [source - np.array([0, 0, below + half]) + ahead * back for ahead in (0.0, 0.05) for below in BELOW_TAP]
+    points = [source - np.array([0, 0, below + half]) + out * back for out in (0.0, 0.05) for below in BELOW_TAP]
     reason, way = yield from _hold_at(world, name, hand, points)
     if reason:
         return Outcome(reason, f"the hand has no way with {name} below {tap}")
@@ -104,7 +110,7 @@ def soak(world: PlannedWorld, step: Step) -> Primitive:
     return Outcome(reason, f"{name} did not take enough water" if reason else "")
 
 
-BELOW_TAP = (0.16, 0.12, 0.2)
+BELOW_TAP = (0.16, 0.12, 0.2, 0.08, 0.04)
 """m below a source of water at which the top of what is soaked is held, so that the hand passes below the spout."""
 
 

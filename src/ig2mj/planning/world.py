@@ -382,12 +382,26 @@ class PlannedWorld:
                 new = _yawed(quat, angle)
                 for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
                     found = 0
-                    for pos in placer.spots(index, areas, new, self.rng, support, each=EACH):
+                    positions = placer.spots(index, areas, new, self.rng, support, each=EACH)
+                    if predicate == "inside":  # away from where doors shut
+                        middle = self._middle_of_fixed_part(where)
+                        positions = sorted(positions, key=lambda pos: float(np.linalg.norm((pos - middle)[:2])))
+                    for pos in positions:
                         if predicate in ("on_top", "on_floor") or self._would_hold(predicate, name, where, pos, new):
                             found += 1
                             yield Spot(pos, new)
                     if found:
                         break
+
+    def _middle_of_fixed_part(self, name: str) -> Vector:
+        """Of an object without its doors, drawers and lids: middle of its box, m."""
+        tables, model = self.domain.model.tables, self.stage.scene.model
+        index = self.index(name)
+        joints = np.isin(model.jnt_qposadr, tables.openable_qposadr[tables.openable_object == index])
+        own = tables.piece_object == index
+        fixed = np.flatnonzero(own & ~np.isin(tables.piece_body, model.jnt_bodyid[joints]))
+        corners = self.vertices_of_pieces(fixed if len(fixed) else np.flatnonzero(own))
+        return (corners.min(0) + corners.max(0)) / 2
 
     def _upright(self, name: str) -> list[Float[np.ndarray, "4"]]:
         """Orientations in which an object rests, each the nearest to its present one; that, where none is known."""
