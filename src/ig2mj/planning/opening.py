@@ -42,8 +42,8 @@ SHUT, MOVED = 0.01, 0.05
 LAST = 0.1
 """Share of a joint's range to which a hand on the edge of a door pulls it shut; it is pushed from there."""
 
-STANCES, WAYS = 20, 16
-"""Stances for each grip, and ways of a hand that are looked for, at most."""
+STANCES, WAYS = 20, 12
+"""Stances for each grip, and ways of a hand that are looked for with one kind of grip, at most."""
 
 
 def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
@@ -148,9 +148,9 @@ def _ways(joint: OpenableJoint, value: bool) -> list[tuple[tuple[FaceGrip, ...],
 
 def _plan(world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int) -> _JointPlan | None:
     floor, obstacles = world.floor(), world.obstacles()
-    count, passed = 0, 0
+    passed = 0
     for grips, fraction, pulls in _ways(joint, value):
-        sweep = joint.sweep(fraction)[:, :2]
+        count, sweep = 0, joint.sweep(fraction)[:, :2]
         for grip in grips:
             places = joint.path(grip, fraction)
             first, normal = places[0]
@@ -163,7 +163,7 @@ def _plan(world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tri
                     continue
                 count += 1
                 if count > WAYS:
-                    return None
+                    break
                 spheres = world.spheres(_fingers(normal, pulls, hand), -normal)
                 before = first + ABOVE * normal
                 back = [-ahead(stance.yaw), normal, UP]

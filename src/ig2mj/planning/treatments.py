@@ -49,35 +49,40 @@ def _hold_at(
     """Brings a held object's centre of mass, or an annotated link of it, to the first of some points that the hand has
     a way to, with the robot standing anywhere; returns the reason why it did not, and the way."""
 
-    def part() -> Vector:
-        return world.com(name) if link < 0 else np.asarray(world.view.link_pos)[world.world, link].astype(float)
+    def part(share: float) -> Vector:
+        if link >= 0:
+            return np.asarray(world.view.link_pos)[world.world, link].astype(float)
+        out = ahead(world.base[1])
+        far = float(((world.vertices(name) - world.com(name)) @ out).max())
+        return world.com(name) + share * far * out
 
     for _ in range(ATTEMPTS):
         obstacles, floor, now = world.obstacles([name]), world.floor(), world.base[1]
-        offset = world.grip(hand) - part()
-        held = about_vertical(-now) @ offset
+        offsets = {share: world.grip(hand) - part(share) for share in (PARTS if link < 0 else PARTS[:1])}
 
-        def candidates(floor=floor, held=held) -> Iterator[tuple[Stance, Vector]]:
-            for point in points:
-                yield from ((stance, point) for stance in world.stances(hand, point, floor, AWAY, STANCES, held))
+        def candidates(floor=floor, now=now, offsets=offsets) -> Iterator[_Holding]:
+            for share, offset in offsets.items():
+                held = about_vertical(-now) @ offset
+                for point in points:
+                    for stance in world.stances(hand, point, floor, AWAY, STANCES, held):
+                        yield stance, point, share
 
-        def has_way(
-            candidate: tuple[Stance, Vector], search: bool, obstacles=obstacles, now=now, offset=offset
-        ) -> bool:
-            stance, point = candidate
+        def has_way(candidate: _Holding, search: bool, obstacles=obstacles, now=now, offsets=offsets) -> bool:
+            stance, point, share = candidate
             rotation = about_vertical(stance.yaw - now)
             spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
             standing, start = obstacles.about(stance.xy, *BODY), world.carried(hand, stance)
-            back = [UP, -ahead(stance.yaw)]
-            return hand_path(standing, spheres, start, point + rotation @ offset, back, search=search) is not None
+            target, back = point + rotation @ offsets[share], [UP, -ahead(stance.yaw)]
+            return hand_path(standing, spheres, start, target, back, search=search) is not None
 
         found = first_way(candidates(), has_way, WAYS)
         if found is None:
             return "no_path", []
-        stance, point = found
+        stance, point, share = found
+        turned = about_vertical(stance.yaw - now) @ offsets[share]
         if (yield from go(world, stance)):
             continue
-        target = point - part() + world.grip(hand)
+        target = point + turned
         spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
         back, obstacles = [UP, -ahead(world.base[1])], world.obstacles([name], world.stance)
         way = hand_path(obstacles, spheres, world.grip(hand), target, back, search=True)
@@ -86,7 +91,13 @@ def _hold_at(
     return "no_path", []
 
 
-STANCES, WAYS = 6, 48
+_Holding = tuple[Stance, Vector, float]
+"""Where the robot stands, where a part of what it holds is to be, and which part."""
+
+PARTS = (0.0, 0.6, 0.85)
+"""Parts of a held object that are tried: shares of the way from its centre of mass to its end away from the robot."""
+
+STANCES, WAYS = 4, 60
 """Stances for each point, and ways of a hand that are looked for, at most."""
 
 

@@ -34,8 +34,8 @@ RADIUS, CORNER, BEHIND, ALONG = 0.03, 0.03, 0.014, (0.07, 0.1)
 """m: of the spheres of a hand: radius; of the palm's corners from its middle, along the fingers and across; of the palm
 behind the grasp point; of the fingers ahead of it."""
 
-HELD_POINTS, HELD_MARGIN = 60, 0.012
-"""Points of what a hand holds that keep clear, and m by which they do."""
+HELD_POINTS, HELD_MARGIN, LATTICE = 60, 0.012, 0.04
+"""Corners of what a hand holds that keep clear, and points within it, about; m by which they do, and between them."""
 
 BODY, BODY_SPARE = (BODY_RADIUS + 0.01, 2 * BODY_HEIGHT), 0.04
 """m: radius and height of the body that what is held keeps clear of, and what is left between both when it is
@@ -109,6 +109,7 @@ class PlannedWorld:
     query: SceneQuery
     world: int
     rng: np.random.Generator
+    _points: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
     _sensed: tuple[PhysicsView, Senses] | None = dataclasses.field(default=None, init=False)
 
     @property
@@ -207,12 +208,30 @@ class PlannedWorld:
         """
         found = hand_spheres(fingers, palm)
         if holding:
-            points = self.vertices(holding) - self.grip(hand)
+            points = self.points(holding) - self.grip(hand)
             points = points if rotation is None else points @ rotation.T
-            step = max(1, len(points) // HELD_POINTS)
-            margin = np.full((len(points[::step]), 1), HELD_MARGIN)
-            found = np.concatenate([found, np.concatenate([points[::step], margin], axis=1)])
+            found = np.concatenate([found, np.column_stack([points, np.full(len(points), HELD_MARGIN)])])
         return found
+
+    def points(self, name: str) -> Float[np.ndarray, "n 3"]:
+        """Points of an object by which it is kept clear: corners of its pieces, and a lattice within them."""
+        pos, quat = self.pose(name)
+        frame = matrices_on_host(quat[None])[0]
+        if name not in self._points:
+            corners = self.vertices(name)
+            low, high = corners.min(0), corners.max(0)
+            spacing = max(LATTICE, float(np.prod(np.maximum(high - low, LATTICE)) / HELD_POINTS) ** (1 / 3))
+            ranges = [
+                np.arange(a + spacing / 2, b, spacing) if b - a > spacing else [(a + b) / 2]
+                for a, b in zip(low, high, strict=True)
+            ]
+            grid = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 3)
+            others = set(range(len(self.domain.model.tables.object_names))) - {self.index(name)}
+            own = self.planner.obstacles(self.view, others, self.world)
+            inside = grid[own.distance(grid) < LATTICE / 4]
+            step = max(1, len(corners) // HELD_POINTS)
+            self._points[name] = (np.concatenate([corners[::step], inside]) - pos) @ frame
+        return self._points[name] @ frame.T + pos
 
     def hand_axes(self, hand: int, rotation: Rotation | None = None) -> tuple[Vector, Vector]:
         """Where a hand's fingers point, and its palm faces, if it were turned, world frame."""
