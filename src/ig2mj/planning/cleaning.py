@@ -36,16 +36,22 @@ PRESSES = 4
 RAISED = 0.25
 """m that a tool is lifted before the hand goes back to where it carries it."""
 
+TURNS = (np.pi / 2, -np.pi / 2, np.pi)
+"""rad about a face's normal by which a tool is turned where it has no room otherwise."""
+
 LOWEST = -0.3
 """Smallest z of the normal of a face that is cleaned."""
 
-NEAREST, STANCES, FEW = 8, 3, 4
+NEAREST, STANCES, FEW = 8, 4, 4
 """Particles that stances are looked for, stances for each, and strokes of each of which one has to have a way."""
 
-TRIES = 3
+TRIES = 4
 """Times that a particle is gone for."""
 
-REGRASPS = 3
+ELSEWHERE = 0.12
+"""m between stances from which an object is cleaned."""
+
+REGRASPS = 8
 """Times that a tool which was lost is taken again."""
 
 COVERED = 0.5
@@ -63,6 +69,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
         if world.domain.has(tool, "toggleable") and not world.facts.holds("toggled_on", tool):
             yield from toggle(True)(world, Step("toggle_on", (tool,)))
         reason, detail, lost, tried = "no_base", f"no dirt of {name} is in reach", 0, collections.Counter[int]()
+        visited: list[Stance] = []
         for attempt in range(ROUNDS):
             if not world.facts.holds(predicate, name):
                 break
@@ -81,9 +88,10 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 hand = hand_with(world, tool)
             spots = [spot for spot in world.dirt(predicate, name) if tried[spot.number] < TRIES]
             spots.sort(key=lambda spot: tried[spot.number])
-            plan = _plan(world, tool, hand, spots)
+            plan = _plan(world, tool, hand, spots, visited)
             if plan is None:
                 break
+            visited.append(plan.stance)
             if failed := (yield from go(world, plan.stance)):
                 reason, detail = failed, f"no way leads to where the dirt of {name} is in reach"
                 tried.update(spot.number for spot in plan.covered)
@@ -181,14 +189,18 @@ class _CleanPlan:
         return [spot for stroke in self.strokes for spot in stroke]
 
 
-def _plan(world: PlannedWorld, tool: str, hand: int, spots: Sequence[DirtSpot]) -> _CleanPlan | None:
-    """The stance from which most particles are in reach, of those near the nearest ones."""
+def _plan(
+    world: PlannedWorld, tool: str, hand: int, spots: Sequence[DirtSpot], visited: Sequence[Stance]
+) -> _CleanPlan | None:
+    """The stance from which most particles are in reach, of those near the nearest ones that were not visited."""
     floor, obstacles = world.floor(), world.obstacles([tool])
     spots = [s for s in spots if s.normal[2] > LOWEST]
     away = world.away(world.spheres(*world.hand_axes(hand), holding=tool, hand=hand))
     best: _CleanPlan | None = None
     for aim in spots[:NEAREST]:
         for stance in world.stances(hand, aim.pos + PRESSED * aim.normal, floor, away, STANCES):
+            if any(np.linalg.norm(np.subtract(stance.xy, v.xy)) < ELSEWHERE for v in visited):
+                continue
             for turn, region in enumerate(_regions(world, tool, hand, stance, aim.normal)):
                 standing, start = obstacles.about(stance.xy, *BODY), world.carried(hand, stance)
                 clear = _room(standing, _spheres(world, tool, hand, region))
@@ -270,12 +282,33 @@ def _way(
 
 def _program(world: PlannedWorld, tool: str, hand: int, plan: _CleanPlan, spot: DirtSpot) -> Program:
     """Presses the tool on a particle and lifts it; nothing where the hand has no way there."""
-    obstacles, stance, keeps = world.obstacles([tool], world.stance), world.stance, world.index(tool)
+    obstacles, stance = world.obstacles([tool], world.stance), world.stance
     regions = _regions(world, tool, hand, stance, spot.normal)
-    region = regions[min(plan.turn, len(regions) - 1)]
-    way = _way(world, tool, hand, obstacles, stance.yaw, region, world.grip(hand), spot, search=True)
-    if way is None:
-        return []
+    regions = [regions[min(plan.turn, len(regions) - 1)]]
+    regions += [_turned(world, tool, hand, regions[0], spot.normal, angle) for angle in TURNS]
+    for search in (False, True):
+        for region in regions:
+            way = _way(world, tool, hand, obstacles, stance.yaw, region, world.grip(hand), spot, search)
+            if way is not None:
+                return _press(world, tool, hand, region, spot, way)
+    return []
+
+
+def _turned(world: PlannedWorld, tool: str, hand: int, region: _Region, normal: Vector, angle: float) -> _Region:
+    """The same tool turned about the normal of a face, rad."""
+    area, _ = _area(world, tool)
+    points = (world.vertices(tool) if area is None else area) - world.grip(hand)
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = normal
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    rotation = (np.eye(3) + s * k + (1 - c) * (k @ k)) @ region.rotation
+    return _Region(rotation, (points @ rotation.T).min(0), (points @ rotation.T).max(0))
+
+
+def _press(
+    world: PlannedWorld, tool: str, hand: int, region: _Region, spot: DirtSpot, way: Sequence[Vector]
+) -> Program:
+    keeps = world.index(tool)
     quat, target = world.turned_hand(hand, region.rotation), region.at(spot)
     return [
         *travel(hand, way, quat, keeps=keeps),
