@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from ig2mj.planning.clearance import HELD
+from ig2mj.planning.clearance import HELD, Obstacles
 from ig2mj.planning.grasps import GraspPose, ordered, sides
 from ig2mj.planning.hand_search import search_way
 from ig2mj.planning.world import hand_spheres
 
 
-class Wall:
+class Wall(Obstacles):
     """A wall at x = 0, as high and wide as `size`, m."""
 
     def __init__(self, size: float):
@@ -51,4 +51,4 @@ def test_a_hand_prefers_palm_down_and_fingers_ahead():
 
 
 def test_spheres_of_a_hand_are_larger_than_points_of_what_it_holds():
-    assert (hand_spheres((1, 0, 0), (0, 0, -1))[:, 3] > HELD).all()
+    assert (hand_spheres((1.0, 0.0, 0.0), (0.0, 0.0, -1.0))[:, 3] > HELD).all()
