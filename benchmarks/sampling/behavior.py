@@ -22,6 +22,8 @@ import time
 import warnings
 from typing import Any
 
+import msgspec
+
 from benchmarks.harness.paths import ROOT
 from benchmarks.sampling.behavior_page import write_page
 from ig2mj.errors import Ig2mjError
@@ -88,9 +90,9 @@ def try_home(home: str, activities: list[Activity]) -> dict[str, dict[str, Any]]
         else:
             most |= collections.Counter(bound[activity.name].additions)
     scene = load_scene(home, objects=sorted(most.elements()))
-    model = StateModel.of_manifest(scene.tables, scene.manifest)
     for name, binding in bound.items():
-        rows[name] = compile_in(binding, model)
+        manifest = msgspec.structs.replace(scene.manifest, substances=list(binding.activity.substances))
+        rows[name] = compile_in(binding, StateModel.of_manifest(scene.tables, manifest))
     return {activity.name: rows[activity.name] for activity in activities}
 
 
