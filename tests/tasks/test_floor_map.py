@@ -72,3 +72,12 @@ def test_off_the_map_there_is_no_way(floor):
         floor.distances(np.array([[0, 0]])), np.array([0]), np.array([[3.0, 3.0]], np.float32), floor.origin, 0.1
     )
     assert np.isinf(way[0]) and ahead[0].tolist() == [3.0, 3.0]
+
+
+def test_of_parts_of_a_floor_the_one_with_most_points_in_reach_is_taken():
+    free = np.zeros((60, 60), bool)
+    free[5:55, 5:30], free[5:15, 40:55] = True, True  # the second part, at x > 1 m, is smaller
+    points = np.array([[1.5, -2.0], [2.0, -2.2], [-1.0, 0.0]])
+    assert FloorMap.of_cells(free, 0.1).free.sum() == 50 * 25
+    assert FloorMap.of_cells(free, 0.1, points).free.sum() == 10 * 15
+    assert FloorMap.of_cells(free, 0.1, points[:0]).free.sum() == 50 * 25

@@ -9,7 +9,7 @@ import numpy as np
 
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.scene.scene import load_scene
-from ig2mj.tasks.navigation.starts import Places
+from ig2mj.tasks.navigation.starts import DOORS, Places
 from ig2mj.worlds.pool import Pool
 
 CLEARANCE = 0.45
@@ -21,7 +21,8 @@ TURN = 5.0
 
 def standing_place(home: str, added: Sequence[str], names: Sequence[str], pool: Pool) -> tuple[float, float, float]:
     """World x and y (m) of free floor with room to turn, near objects in the pool's first row; and degrees by which a
-    robot is turned that faces them.
+    robot is turned that faces them. Doors between rooms stand open, but for those that are named; where they part the
+    floor, the robot stands where most of the objects are in reach.
 
     Args:
       home, added: the household, as of `load_scene`. names: the objects; others are ignored, such as rooms.
@@ -35,14 +36,19 @@ def standing_place(home: str, added: Sequence[str], names: Sequence[str], pool: 
     own = probe.start_data().qpos.copy()
     row = np.asarray(pool.physics.scene.qpos)[0]
     own[: len(row)] = row
+    tables = probe.tables
+    doors = np.isin(np.array(tables.object_categories), DOORS) & ~np.isin(np.array(tables.object_names), names)
+    open_now = doors[tables.openable_object]
+    own[tables.openable_qposadr[open_now]] = tables.openable_open[open_now]
     places = Places(probe, own)
-    floor = places.floor()
+    there = [name for name in names if name in probe.object_names]
+    centres = places.object_positions(tuple(there))[:, :2]
+    floor = places.floor(centres)
     padded = np.pad(floor.free, 1)
     away = np.asarray(scipy.ndimage.distance_transform_edt(padded))[1:-1, 1:-1] * floor.resolution
     cells = np.argwhere(away >= min(CLEARANCE, away.max()))
     spots = floor.centres(cells)
-    there = [name for name in names if name in probe.object_names]
-    centres = places.object_positions(tuple(there))[:, :2] if there else spots.mean(0, keepdims=True)
+    centres = centres if there else spots.mean(0, keepdims=True)
     apart = np.linalg.norm(spots[:, None] - centres[None], axis=-1)
     x, y = spots[int(np.argmin(np.median(apart, axis=1)))]
     ahead = centres.mean(0) - (x, y)

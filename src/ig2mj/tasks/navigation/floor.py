@@ -34,6 +34,9 @@ CLEAR_AT = (0.35, 0.55, 0.75)
 """Shares of the straight line to the next point of the way at which the floor must be free: at a corner the nearest
 point in sight would lead into it."""
 
+REACH = 1.0
+"""m from free floor within which an object is in reach of a robot that stands there."""
+
 _STEPS = np.array([(0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)])
 """Rows and columns; the opposite ones are the same edges."""
 
@@ -52,8 +55,13 @@ class FloorMap:
     resolution: float
 
     @classmethod
-    def of_cells(cls, free: Bool[np.ndarray, "n n"], resolution: float) -> FloorMap:
+    def of_cells(
+        cls, free: Bool[np.ndarray, "n n"], resolution: float, near: Float[np.ndarray, "k 2"] | None = None
+    ) -> FloorMap:
         """The largest connected part of a map whose centre is the world's origin, without the empty margin.
+
+        Args:
+          near: points, m; the part from which most of them are in reach, the largest of several such.
 
         Raises:
           ValueError: nothing is free.
@@ -63,7 +71,14 @@ class FloorMap:
         labels = np.asarray(scipy.ndimage.label(free, np.ones((3, 3)))[0])  # pyright: ignore[reportIndexIssue]
         if not labels.any():
             raise ValueError("no cell is free")
-        part = labels == 1 + np.argmax(np.bincount(labels.ravel())[1:])
+        size = np.bincount(labels.ravel()).astype(float)
+        score = size / size.sum()
+        if near is not None:
+            spots = (np.argwhere(free)[:, ::-1] + 0.5 - len(free) / 2) * resolution
+            for point in near:
+                score[np.unique(labels[free][np.linalg.norm(spots - point, axis=1) < REACH])] += 1
+        score[0] = -1.0
+        part = labels == np.argmax(score)
         rows, columns = np.flatnonzero(part.any(1)), np.flatnonzero(part.any(0))
         first = np.array([columns[0], rows[0]])
         part = part[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]

@@ -244,8 +244,8 @@ class Places:
         mujoco.mj_kinematics(self.scene.model, self._data)
         return self._data.xpos[[self.scene.tables.object_root[self.scene.object_index(n)] for n in names]]
 
-    def floor(self) -> FloorMap:
-        """Where the first robot can stand."""
+    def floor(self, near: Float[np.ndarray, "n 2"] | None = None) -> FloorMap:
+        """Where the first robot can stand. `near`: see `FloorMap.of_cells`."""
         rooms = self.scene.rooms
         if rooms is None or rooms.traversable is None:
             raise EngineError(f"'{self.scene.name}' has no map of its free floor (rooms.npz)")
@@ -255,7 +255,7 @@ class Places:
             x, y = (np.array([column, row]) + 0.5 - size / 2) * resolution
             free[row, column] = any(self.stands(0, (x, y, 2 * np.pi * k / YAWS)) for k in range(YAWS))
         try:
-            return FloorMap.of_cells(free, resolution)
+            return FloorMap.of_cells(free, resolution, near)
         except ValueError:
             raise EngineError(f"there is no free floor for the robot in '{self.scene.name}'") from None
 
