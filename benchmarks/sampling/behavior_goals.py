@@ -54,7 +54,7 @@ def main() -> None:
     args = parser.parse_args()
     folder = args.out / "goals"
     folder.mkdir(parents=True, exist_ok=True)
-    homes = sampled_homes(args.out / "starts")
+    homes = sampled_homes(args.out / "starts") or sampled_homes(RESULTS / "starts")
     names = args.activities or sorted(homes)
     work = functools.partial(
         measure, folder=folder, homes=homes, seeds=args.seeds, seconds=args.seconds, resume=args.resume
@@ -66,7 +66,10 @@ def main() -> None:
     ) as pool:
         running = {pool.submit(work, name, made_by=made_by): name for name in names}
         for done in concurrent.futures.as_completed(running):
-            print(done.result(), flush=True)
+            try:
+                print(done.result(), flush=True)
+            except Exception as e:  # --resume tries it again
+                print(f"{running[done]}: {type(e).__name__}: {e}", flush=True)
     write_page(args.page, folder)
 
 
