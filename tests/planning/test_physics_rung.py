@@ -6,7 +6,7 @@ import ig2mj
 from ig2mj.agents.humanoid import Humanoid
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.planning import PlanningError
+from ig2mj.planning import BatchAgent, PlanningError
 
 
 def simulation_of(folder, robot, **options):
@@ -86,3 +86,16 @@ def test_what_another_robot_holds_is_not_taken_from_it(tiny_home_folder):
     assert one.facts.held == ("apple",)
     with pytest.raises(EngineError, match="has 2 robots: name one"):
         _ = simulation.agent
+
+
+@pytest.mark.slow
+def test_a_robot_carries_out_a_primitive_in_all_worlds_of_a_batch(tiny_home_folder):
+    agents = [TurtleBot(name="idle").at(1.2, -1.4, 0.0), Humanoid(name="acting").at(-1.4, -1.2, 0.0)]
+    scene = ig2mj.load_scene(tiny_home_folder, agents=agents)
+    with pytest.raises(UnknownNameError, match="no robot is named 'actin'"):
+        BatchAgent.of_scene(scene, 2, "actin")
+    agent = BatchAgent.of_scene(scene, 2, "acting")
+    outcomes = agent.do("toggle_on", "stove")
+    assert len(outcomes) == 2 and all(outcome.done for outcome in outcomes)
+    stove = scene.object_index("stove")
+    assert agent.rung.stage.states.toggled_on[:, stove].all()

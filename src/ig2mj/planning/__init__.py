@@ -4,6 +4,7 @@
 after each. docs/design/planning.md describes how they fit together.
 """
 
+from ig2mj.planning.batch_agent import BatchAgent
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.kinematic import KinematicRung
@@ -20,6 +21,7 @@ __all__ = [
     "PRIMITIVES",
     "REASONS",
     "BasePlan",
+    "BatchAgent",
     "Domain",
     "EpisodeResult",
     "Facts",

@@ -75,10 +75,8 @@ class CoreStage:
     """Worlds of an engine of their own; one robot acts.
 
     Attributes:
-      core, batch: what steps the worlds, and their present state.
+      core, batch: what steps the worlds, and their present state. agent: number of the robot.
     """
-
-    agent = 0
 
     def __init__(
         self,
@@ -87,19 +85,24 @@ class CoreStage:
         grasping: str = "assisted",
         starts: Pool | None = None,
         goal: CompiledExpression | None = None,
+        agent: int = 0,
     ):
         """
         Args:
           scene: with the robot. engine: of this scene. grasping: see `ig2mj.Worlds`.
           starts: of the bare scene, the first row for the first world and so on; None: the scene's own start.
+          agent: number of the robot that acts; others stay as they are.
         """
         self.scene = scene
         rules = Rules.of_scene(scene)
         rules = rules if goal is None else rules.with_goal(goal)
         self.model = rules.model
         controllers = controllers_of(scene, ACTION_PERIOD)
-        self.controller = controllers[0]
-        self._others = sum(c.action_size for c in controllers[1:])
+        self.agent = agent
+        self.controller = next(c for c in controllers if c.agent == agent)
+        before = sum(c.action_size for c in controllers if c.agent < agent)
+        self._own = slice(before, before + self.controller.action_size)
+        self._size = sum(c.action_size for c in controllers)
         self.core = Core(engine, rules, None, controllers, grasping_of(engine, grasping), True)
         self._steps = max(1, round(ACTION_PERIOD / (engine.substeps * engine.timestep)))
         self.restart(starts)
@@ -139,8 +142,8 @@ class CoreStage:
         self.batch = self.core.write(self.batch, whole)
 
     def act(self, action: Float[np.ndarray, "W n"]) -> None:
-        rest = np.zeros((len(action), self._others), np.float32)
-        whole = np.concatenate([np.asarray(action, np.float32), rest], axis=1)
+        whole = np.zeros((len(action), self._size), np.float32)
+        whole[:, self._own] = action
         self.batch, _ = self.core.repeat_action_fn(self.batch, whole, self._steps)
 
     def ended(self, world: int) -> str | None:
