@@ -80,3 +80,17 @@ def test_solve_prints_one_line_of_json_and_lines_of_steps(tiny_home_folder, caps
     figures = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert set(figures) == {"success_rate", "q", "episodes", "replans", "seconds", "failures"}
     assert figures["success_rate"] == 0.0 and figures["episodes"] == 1
+
+
+def test_recorded_plans_become_strips_and_a_page_of_them(solved, tmp_path, capsys):
+    from PIL import Image
+
+    file, *_ = solved
+    strip = tmp_path / "strip.jpg"
+    assert call(["demos", "video", str(file), "--out", str(strip), "--size", "80", "60"]) == 0
+    assert "2 primitives" in capsys.readouterr().out
+    width, height = Image.open(strip).size
+    assert height == 60 and width > 5 * 80
+    page = tmp_path / "gallery.md"
+    assert call(["demos", "gallery", str(file), "--out", str(page)]) == 0
+    assert "images/gallery/runs.jpg" in page.read_text() and "2 primitives" in page.read_text()

@@ -98,3 +98,29 @@ def test_a_stranger_gets_a_form_and_comes_in_with_the_token(browser, viewer):
     page.get_by_role("button", name="Open").click()
     page.get_by_text("bodies that moved").wait_for()
     context.close()
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (390, 844)], ids=["desktop", "phone"])
+def test_buttons_of_the_selected_object_let_a_robot_act(browser, tiny_home_folder, size):
+    from ig2mj.planning import problem_of
+    from ig2mj.web.planning import Planned
+    from ig2mj.web.viewer import WebViewer
+
+    source = Planned(problem_of(str(tiny_home_folder), "(toggled_on stove)"))
+    with WebViewer(source, access_for(None, 0)) as viewer:
+        page = browser.new_page(viewport=dict(zip(("width", "height"), size, strict=True)))
+        page.set_default_timeout(120_000)
+        page.goto(viewer.url, wait_until="commit")
+        page.get_by_text("its hands are empty").wait_for()
+        viewer.controls.choose(source.scene.object_index("stove"))
+        viewer.runner.speed = 10.0
+        page.get_by_role("button", name="Switch on").click()
+        page.get_by_text("toggle_on stove").wait_for()
+        for _ in range(300):
+            if source.report.rows and source.report.rows[-1][2] != "now":
+                break
+            page.wait_for_timeout(500)
+        (_, text, state, _), *_ = source.report.rows
+        assert text == "toggle_on stove" and state != "now"
+        page.get_by_text(state).first.wait_for()
+        page.close()

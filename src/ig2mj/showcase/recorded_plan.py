@@ -18,6 +18,7 @@ from ig2mj.errors import InputError
 from ig2mj.files.content import decode_json
 from ig2mj.showcase.film_strip import ENDINGS
 from ig2mj.showcase.plan_video import PlanVideo
+from ig2mj.tasks.own_goal import split_goal_name
 
 STRIP_SIZE, STRIP_FRAMES = (240, 180), 5
 """Pixels of an image of a strip, and their number."""
@@ -135,13 +136,12 @@ def write_gallery(
             image = images / f"{file.stem}.jpg"
             plan = write_video(recording, image)
             task, home = str(recording.header.get("task", "")), str(recording.header.get("scene", ""))
-        name = task.removeprefix("activity/").removeprefix("goal/")
-        title = name if "(" in name else name.replace("_", " ").capitalize()
+        own = split_goal_name(task)
+        title = "A goal in a home" if own else task.removeprefix("activity/").replace("_", " ").capitalize()
+        goal = f"`{own[1]}`\n\n" if own else ""
+        about = f"Home {home}, {len(plan.steps)} primitives, {plan.seconds:.0f} s of simulated time."
         where = os.path.relpath(image, page.parent)
-        parts.append(
-            f"## {title}\n\nHome {home}, {len(plan.steps)} primitives, {plan.seconds:.0f} s of simulated time.\n\n"
-            f"![{title}]({where})\n"
-        )
+        parts.append(f"## {title}\n\n{about}\n\n{goal}![{title}]({where})\n")
     page.write_text("\n".join([_HEAD, *sorted(parts)]), encoding="utf-8")
     return len(parts)
 
@@ -150,5 +150,5 @@ _HEAD = """# Gallery of solved activities
 
 The humanoid carries these out in physics, by the planner ([planning](guide/planning.md)). Each strip
 has the start and the ends of primitives of one recorded episode, which replays bit for bit.
-`ig2mj demos gallery RECORDINGS` makes this page.
+`ig2mj demos gallery RECORDINGS --out docs/gallery.md` makes this page.
 """

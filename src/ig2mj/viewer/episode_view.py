@@ -64,7 +64,7 @@ class EpisodeView:
 
         Args:
           qpos: positions in place of those of the state. camera: in place of the one chosen for the episode, or a
-            function that gives it for a model with poses.
+            function that gives it for the model that is drawn, with poses.
 
         Raises:
           MissingDependencyError: nothing can draw here.
@@ -79,13 +79,13 @@ class EpisodeView:
         mujoco.mj_forward(world_model, drawn)
         if camera is None:
             camera = self._of_episode(world_model, drawn, state)
-        elif callable(camera):
-            camera = camera(world_model, drawn)
         states, view = state.batch.world.states, state.batch.world.view
         found = [*marks(self._states, states, view, self._world), *self._goal_marks(state)]
         found += effects(self._states, states, view, self._world, float(data.time))
         width, height = self._size
         seen = visual.data(world_model, drawn)
+        if callable(camera):
+            camera = camera(visual.model, seen)
         with self._tinter.shown(tint_of_objects(self._states, states, self._world)):
             return render(
                 visual.model, seen, camera, width=width, height=height, decorate=lambda scene: draw_marks(scene, found)

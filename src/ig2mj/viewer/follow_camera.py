@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.looks.visual import COSTUMES
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.tables import SceneTables
 from ig2mj.viewer.offscreen import FreeView
@@ -54,7 +55,8 @@ class FollowCamera:
         """The camera for the next image.
 
         Args:
-          data: with poses up to date. objects: numbers of those that matter now, the first most.
+          model, data: of the scene, or what is drawn of it (`ig2mj.looks`), with poses up to date.
+          objects: numbers of those that matter now, the first most.
         """
         tables = self._tables
         base = data.xpos[tables.agent_body[self._agent]]
@@ -68,13 +70,26 @@ class FollowCamera:
                 middle = (1 - SHARE) * middle + SHARE * place if number == objects[0] else middle
         targets += [data.xpos[b] for b, a in zip(tables.hand_body, tables.hand_agent, strict=True) if a == self._agent]
         focus, self._count = (objects[0] if objects else -1), self._count + 1
-        if self._view is None or focus != self._focus or self._count % AGAIN == 0:
+        if (
+            self._view is None
+            or focus != self._focus
+            or self._count % AGAIN == 0
+            or _seen(model, data, self._view, targets, self._own(model, objects)) < 2.0 * len(targets)
+        ):
             self._view, self._focus = self._best(model, data, middle, targets, objects), focus
         before = np.array(self._view.lookat)
         x, y, z = before + SMOOTH * (middle - before) if np.linalg.norm(before - middle) < 1.0 else middle
         at = (float(x), float(y), float(z))
         self._view = FreeView(at, self._view.distance, self._view.azimuth, self._view.elevation)
         return self._view
+
+    def _own(self, model: mujoco.MjModel, objects: Sequence[int]) -> np.ndarray:
+        """Bodies of the robot, of what it wears, and of the objects."""
+        tables, count = self._tables, len(self._tables.body_agent)
+        own = np.zeros(model.nbody, bool)
+        own[:count] = (tables.body_agent == self._agent) | np.isin(tables.body_object, list(objects))
+        own[count:] = [model.body(b).name == COSTUMES for b in range(count, model.nbody)]
+        return own
 
     def _best(
         self, model: mujoco.MjModel, data: mujoco.MjData, middle: Vector, targets: list[Vector], objects: Sequence[int]
@@ -83,7 +98,7 @@ class FollowCamera:
         tables = self._tables
         turn = data.xmat[tables.agent_body[self._agent]].reshape(3, 3)
         yaw = math.degrees(math.atan2(turn[1, 0], turn[0, 0]))
-        own = (tables.body_agent == self._agent) | np.isin(tables.body_object, list(objects))
+        own = self._own(model, objects)
         x, y, z = (float(v) for v in middle)
 
         def value(view: FreeView) -> float:

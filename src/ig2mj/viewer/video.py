@@ -18,7 +18,7 @@ GIF = ["-filter_complex", "[0:v]split[a][b];[a]palettegen[p];[b][p]paletteuse"]
 H264 = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]  # it takes even sizes only
 H264 += ["-c:v", "libx264", "-crf", "20", "-maxrate", "3700k", "-bufsize", "3700k"]  # at most 5 MB in 10 s
 H264 += ["-pix_fmt", "yuv420p", "-movflags", "+faststart"]
-WEBP = ["-c:v", "libwebp_anim", "-loop", "0", "-quality", "55", "-compression_level", "6"]
+WEBP = ["-c:v", "libwebp_anim", "-loop", "0", "-quality", "55", "-compression_level", "4"]
 FORMATS = {".mp4": H264, ".gif": GIF, ".webp": WEBP}
 """ffmpeg's options, by the file's ending."""
 
