@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from ig2mj.planning.bodies import WheeledBody
 from ig2mj.planning.cleaning import clean
+from ig2mj.planning.doors import naming_doors
 from ig2mj.planning.driving import drive_near, go
 from ig2mj.planning.grasping import grasp, release
 from ig2mj.planning.moves import Primitive, PrimitiveFailed
@@ -25,7 +26,7 @@ from ig2mj.planning.world import AWAY, PlannedWorld
 
 def primitive(world: PlannedWorld, step: Step) -> Primitive:
     """What a robot does for a step."""
-    return _guarded(ACTIONS[step.primitive](world, step))
+    return naming_doors(world, step, _guarded(ACTIONS[step.primitive](world, step)))
 
 
 def _guarded(inner: Primitive) -> Primitive:
