@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import jax
 import numpy as np
 import pytest
 
-from ig2mj.tasks.navigation.floor import FloorMap, look_up
+from ig2mj.tasks.navigation.floor import FloorMap
+from ig2mj.tasks.navigation.floor import look_up as plain_look_up
+
+
+def look_up(fields, row, pos, origin, resolution):
+    """As one program: operation by operation it would be sixty."""
+    return jax.jit(lambda *arrays: plain_look_up(*arrays, origin, resolution))(fields, row, pos)
+
 
 WALL = """
 ..........
