@@ -20,7 +20,10 @@ def simulation():
         ((), "open fridge_0, grasp apple_0, place_inside apple_0 fridge_0, close fridge_0, freeze apple_0 fridge_0"),
         ((), "grasp carving_knife_0, slice apple_0 carving_knife_0"),
         ((), "grasp fish_0, toggle_on stove_0, cook fish_0 stove_0"),
-        ((), "open bottom_cabinet_0, grasp dishtowel_0, toggle_on sink_0, soak dishtowel_0 sink_0"),
+        (
+            (("on_top", "dishtowel_0", "breakfast_table_0"),),
+            "grasp dishtowel_0, toggle_on sink_0, soak dishtowel_0 sink_0",
+        ),
         ((), "grasp hardback_0, place_under hardback_0 breakfast_table_0"),
         ((), "open fridge_0, grasp milk_0, place_on_floor milk_0 kitchen_0"),
         ((("open", "fridge_0"),), "close fridge_0"),
