@@ -89,7 +89,8 @@ def test_recorded_plans_become_strips_and_a_page_of_them(solved, tmp_path, capsy
     strip = tmp_path / "strip.jpg"
     assert call(["demos", "video", str(file), "--out", str(strip), "--size", "80", "60"]) == 0
     assert "2 primitives" in capsys.readouterr().out
-    width, height = Image.open(strip).size
+    with Image.open(strip) as image:
+        width, height = image.size
     assert height == 60 and width > 5 * 80
     page = tmp_path / "gallery.md"
     assert call(["demos", "gallery", str(file), "--out", str(page)]) == 0
