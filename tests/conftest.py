@@ -37,9 +37,10 @@ SOURCE = Path(__file__).resolve().parents[1] / "src"
 
 def annotated_modules() -> list[str]:
     """Modules that use jaxtyping, and those that check arrays against its annotations by hand (their scope of names of
-    axes begins with the function). Checks of all others would take a tenth of the suite's time."""
+    axes begins with the function) or replace the constructor of a class that is checked. Checks of all others would take a tenth of the suite's time."""
     files = (file for file in sorted((SOURCE / "ig2mj").rglob("*.py")) if file.name != "__init__.py")
-    annotated = (file for file in files if re.search("jaxtyping|get_type_hints", file.read_text(encoding="utf-8")))
+    checked = re.compile(r"jaxtyping|get_type_hints|\.__init__ = ")
+    annotated = (file for file in files if checked.search(file.read_text(encoding="utf-8")))
     return [".".join(file.relative_to(SOURCE).with_suffix("").parts) for file in annotated]
 
 
