@@ -37,7 +37,8 @@ SOURCE = Path(__file__).resolve().parents[1] / "src"
 
 def annotated_modules() -> list[str]:
     """Modules that use jaxtyping, and those that check arrays against its annotations by hand (their scope of names of
-    axes begins with the function) or replace the constructor of a class that is checked. Checks of all others would take a tenth of the suite's time."""
+    axes begins with the function) or replace the constructor of a class that is checked. Checks of
+    all others take a tenth of the suite's time."""
     files = (file for file in sorted((SOURCE / "ig2mj").rglob("*.py")) if file.name != "__init__.py")
     checked = re.compile(r"jaxtyping|get_type_hints|\.__init__ = ")
     annotated = (file for file in files if checked.search(file.read_text(encoding="utf-8")))
