@@ -35,7 +35,7 @@ def test_who_follows_the_way_arrives_in_every_world(point):
     for steps in (1, 5, *[STEPS] * 10):
         state, tally = actor.several(state, tally, steps)
         scans.append(np.asarray(state.obs["scan"]))
-    assert np.asarray(tally.won).mean() >= 0.95, "single precision may drive one into a corner"
+    assert np.asarray(tally.success).mean() >= 0.95, "single precision may drive one into a corner"
     metrics = point.metrics(state)
     assert metrics["overflow"] == 0 and metrics["not_finite"] == 0
     moved = np.abs(scans[0] - scans[1]).max(axis=(1, 2))
