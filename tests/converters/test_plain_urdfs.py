@@ -261,4 +261,4 @@ def test_a_visual_mesh_of_fewer_than_four_vertices_is_left_out(tmp_path):
     outcome = convert_object(tmp_path / "r.urdf", "toy", tmp_path / "out", options=ConvertOptions(report=False))
     assert "r: link 'l': a visual mesh has fewer than 4 vertices and is left out" in outcome.first_warnings
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "object.xml"))
-    assert model.ngeom == 2 and model.nmesh == 0
+    assert model.ngeom == 3 and model.nmesh == 0  # the ground, a collision box and a visual one

@@ -122,7 +122,7 @@ def test_the_film_shows_stove_and_milk_and_has_the_frames_it_was_given(cooked, t
     colours = world.model.geom_rgba.copy()
     cameras = KitchenCameras(world, kitchen)
     closed = world.render(cameras._milk, width=64, height=64)
-    assert np.abs(cameras.milk(64, 64).astype(int) - closed).mean() > 10  # the doors are see-through
+    assert np.abs(cameras.milk(64, 64).astype(int) - closed).mean() > 5  # the doors are see-through
     assert (world.model.geom_rgba == colours).all()
 
     short = TemperatureLog(log.objects, log.predicates)

@@ -43,7 +43,9 @@ def test_odd_sizes_are_no_error(tmp_path):
 
 
 def test_what_cannot_be_written_is_one_error(tmp_path):
-    with pytest.raises(InputError, match=r"a.avi: is not a video format that can be written \(use .mp4 or .gif\)"):
+    with pytest.raises(
+        InputError, match=r"a.avi: is not a video format that can be written \(use .mp4 or .gif or .webp\)"
+    ):
         VideoWriter(tmp_path / "a.avi", 64, 48, 5)
     video = VideoWriter(tmp_path / "absent" / "a.mp4", 64, 48, 5)
     with pytest.raises(EngineError, match=r"a.mp4: ffmpeg wrote no video: .*No such file"):

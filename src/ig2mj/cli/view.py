@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Vec3 = tuple[float, float, float]
 
-VIDEOS = (".mp4", ".gif")
+VIDEOS = (".mp4", ".gif", ".webp")
 """As `ig2mj.viewer.video.FORMATS`."""
 
 

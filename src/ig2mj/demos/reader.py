@@ -213,7 +213,8 @@ class Recording:
         if self.index.shape[1] != len(columns):
             raise InputError(self.file, f"must have {len(columns)} columns", element="index", fix=FIX)
         # A process that was killed at once has written no array yet, and runs of one frame have no step.
-        needed = [n for n in columns if self._opened.has(n) or (self.index.shape[0] and not n.startswith("steps/"))]
+        frames, runs = self.index.shape[0], sum(name.startswith("run_") for name in self._opened.names())
+        needed = [n for n in columns if self._opened.has(n) or frames > (runs if n.startswith("steps/") else 0)]
         there = {name: self._array(name) for name in needed}
         self.arrays: dict[str, Any] = {name: array for name, array in there.items() if array is not None}
         self.runs: list[Run] = []

@@ -61,7 +61,7 @@ def unknown_environment(name: str, known: Sequence[str]) -> Ig2mjError:
     from ig2mj.scene.paths import shipped_homes  # `import ig2mj` reads this module, and loads no MuJoCo
 
     also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`), tasks of yours FILE.py:NAME"
-    if name in shipped_homes() or pathlib.Path(name).is_dir():
+    if name and (name in shipped_homes() or pathlib.Path(name).is_dir()):
         goal = f'"goal/{name} GOAL"'
         return Ig2mjError(
             f"'{name}' is a home, and an environment is a task in one: {', '.join(known)}, {goal}; {also};"

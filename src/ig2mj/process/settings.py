@@ -8,7 +8,7 @@ import importlib
 import logging
 import os
 import pathlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from ig2mj.errors import EngineError, MissingDependencyError
 from ig2mj.process.compilation import (
@@ -98,6 +98,12 @@ def name_for_processes(variable: str, word: str, separator: str) -> None:
     words = [known for known in os.environ.get(variable, "").split(separator) if known]
     if word not in words:
         os.environ[variable] = separator.join([*words, word])
+
+
+def default_variables(variables: Mapping[str, str]) -> None:
+    """Sets environment variables that the user did not set, for processes that are started later."""
+    for variable, value in variables.items():
+        os.environ.setdefault(variable, value)
 
 
 def name_opengl_platform() -> None:

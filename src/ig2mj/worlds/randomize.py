@@ -60,7 +60,7 @@ class Physics:
     def __post_init__(self) -> None:
         """Raises EngineError: a range is none."""
         for field in dataclasses.fields(self):
-            object.__setattr__(self, field.name, _range(field.name, getattr(self, field.name)))
+            _range(field.name, getattr(self, field.name))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Randomize:
 
     def __post_init__(self) -> None:
         """Raises EngineError, UnknownNameError: an axis is neither True nor settings of it."""
-        object.__setattr__(self, "physics", _physics(self.physics))
+        _physics(self.physics)
 
     @classmethod
     def of(cls, given: Any) -> Randomize | None:
@@ -85,7 +85,7 @@ class Randomize:
           EngineError: it is none of these. UnknownNameError: no such axis.
         """
         if given is None or isinstance(given, Randomize):
-            found = given
+            found = given and cls(physics=_physics(given.physics))
         elif isinstance(given, Mapping):
             found = cls(**{name: _physics(value) for name, value in _known("axis of Randomize", given, cls).items()})
         else:
@@ -104,7 +104,8 @@ class Randomize:
 
     def as_dict(self) -> dict[str, Any]:
         """Its settings in plain values, for files; `of` reads them."""
-        return {name: _plain(dataclasses.asdict(getattr(self, name))) for name in self.axes}
+        settings = {"physics": _physics(self.physics)}
+        return {name: _plain(dataclasses.asdict(found)) for name, found in settings.items() if found is not None}
 
 
 class Randomization:
@@ -112,8 +113,7 @@ class Randomization:
 
     def __init__(self, randomize: Randomize, model: mujoco.MjModel, tables: SceneTables):
         """model, tables: of the scene with its robots."""
-        assert isinstance(randomize.physics, Physics)
-        self.physics, whole = randomize.physics, _wholes(tables)
+        self.physics, whole = _physics(randomize.physics) or Physics(), _wholes(tables)
         self._geom_object, self._objects = whole[tables.geom_object], len(tables.object_names)
         self._friction = np.array(model.geom_friction, np.float32)
         joint_object = whole[tables.body_object[model.jnt_bodyid]]

@@ -43,6 +43,7 @@ def benchmark(
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.planning.requests import MEASURED
     from ig2mj.planning.steps import PlanningError
+    from ig2mj.process.settings import default_variables
     from ig2mj.simulation.requests import RUNGS
 
     if requests < 1:
@@ -63,8 +64,7 @@ def benchmark(
     rows = [row for row in rows if row["primitive"] in names and row["number"] < requests]
     work = _jobs({(row["primitive"], row["number"]) for row in rows}, names, requests, conditions, seconds)
     if jobs != 1:
-        for variable, value in ONE_THREAD.items():
-            os.environ.setdefault(variable, value)
+        default_variables(ONE_THREAD)
     job_set = JobSet("ig2mj.simulation.requests:measure", f"{requests} requests to each primitive, {rung}", work)
     made_by = {"conditions": conditions, "command": _command(), "commit": _commit(), "versions": versions()}
     failed: dict[str, str] = {}
@@ -166,8 +166,10 @@ def _read(out: pathlib.Path | None) -> list[Row]:
     for number, line in enumerate(out.read_text(encoding="utf-8").splitlines(), 1):
         try:
             row = json_module.loads(line)
-            row["conditions"], row["primitive"], row["number"]
-        except (ValueError, KeyError, TypeError):
+            missing = {"conditions", "primitive", "number"} - set(row)
+        except (ValueError, TypeError):
+            missing = {"all"}
+        if missing:
             raise InputError(
                 out, "is not a result of a request", element=f"line {number}", fix="name another file"
             ) from None
