@@ -45,7 +45,7 @@ def test_a_file_of_ones_own_adds_substances(own):
 @pytest.mark.parametrize(
     "said, message",
     [
-        ("{", "not JSON"),
+        ("{", "not valid JSON"),
         ({"gas": {}}, "liquid, granular, visual"),
         ({"liquid": {"names": []}}, "mapping"),
         ({"liquid": {"names": {"a b": {}}}}, "must be a name"),

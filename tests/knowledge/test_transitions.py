@@ -54,7 +54,7 @@ GOOD = {"name": "x", "from": ["water"], "makes": "tea"}
 @pytest.mark.parametrize(
     "said, message",
     [
-        ("[", "not JSON"),
+        ("[", "not valid JSON"),
         ({}, "list of rules"),
         ([{"name": "x"}], "needs name, from and makes"),
         ([{**GOOD, "from": []}], "makes something of nothing"),

@@ -28,8 +28,9 @@ def simulation():
         ((), "open fridge_0, grasp milk_0, place_on_floor milk_0 kitchen_0"),
         ((("open", "fridge_0"),), "close fridge_0"),
         ((("open", "window_0"),), "close window_0, open window_0"),
+        ((), "navigate_to sofa_0, navigate_to breakfast_table_0"),
     ],
-    ids=["freeze", "slice", "cook", "soak", "under", "on_floor", "close", "window"],
+    ids=["freeze", "slice", "cook", "soak", "under", "on_floor", "close", "window", "wide"],
 )
 def test_the_humanoid_does(simulation, before, requests):
     simulation.reset()

@@ -164,9 +164,9 @@ def coverage(
         rows = all_of_it.cover(homes, results, names or None, add_bar(bar, "binding definitions"))
         if sample and results is not None:
             report = add_bar(bar, "sampling start states")
-            wanted = [row.name for row in rows if row.homes and row.sampled is None]
-            for done, name in enumerate(wanted):
-                report(done, len(wanted), name)
+            unsampled = [row.name for row in rows if row.homes and row.sampled is None]
+            for done, name in enumerate(unsampled):
+                report(done, len(unsampled), name)
                 all_of_it.sample_definition(name, homes, results, seconds)
             rows = all_of_it.cover(homes, results, names or None)
     if page is not None:

@@ -112,14 +112,15 @@ def run(
     conditions = {"problem": problem.name, "goal": goal, "robot": robot, "rung": rung, "split": split, "seed": seed}
     conditions |= {"doors": doors} if rung != "symbolic" else {}
     results = ResultFile(out, conditions)
-    wanted = [n for n in range(episodes) if n not in results.kept]
-    if record is not None and len(wanted) < episodes:
-        print(f"{out} holds {episodes - len(wanted)} of the episodes: {record} gets the others", file=sys.stderr)
+    missing = [n for n in range(episodes) if n not in results.kept]
+    if record is not None and len(missing) < episodes:
+        print(f"{out} holds {episodes - len(missing)} of the episodes: {record} gets the others", file=sys.stderr)
     options = {"robot": robot, "worlds": worlds, "split": split, "seed": seed, "doors_open": doors == "open"}
     try:
         with StepTable(problem.name) as table:
-            solved = {"symbolic": _symbolic, "kinematic": _kinematic, "physics": _physical}[rung]
-            for number, result in solved(problem, planner, wanted, options, table, seconds, record, video):
+            common = (problem, planner, missing, options, table, seconds)
+            solved = _physical(*common, record, video) if rung == "physics" else _set(*common, rung == "kinematic")
+            for number, result in solved:
                 results.add(number, result)
     except KeyboardInterrupt:
         kept = [f"{file} holds what was done" for file in (out, record) if file is not None]
@@ -144,41 +145,27 @@ STRIPS = (".png", ".jpg")
 """Endings of files that get a few images of a video side by side."""
 
 
-def _symbolic(
+def _set(
     problem: Problem,
     planner: TaskPlanner,
     numbers: Sequence[int],
     options: dict[str, Any],
     table: StepTable,
     seconds: float,
-    *_: object,
+    kinematic: bool,
 ) -> Iterator[tuple[int, EpisodeResult]]:
-    """Episodes in which states are set. `options`: of `ig2mj.demos.solving.Episodes`."""
+    """Episodes in which states are set. `options`: of `ig2mj.demos.solving.Episodes`. kinematic: motion is planned."""
+    from ig2mj.planning.kinematic import kinematic_episodes
     from ig2mj.planning.solver import solve
     from ig2mj.planning.symbolic import symbolic_episodes
 
     pool = problem.pool(options["split"], max([0, *numbers]) + 1)
-    for number, rung in symbolic_episodes(planner.domain, problem.scene, pool, numbers, options["seed"]):
-        table.begin([number])
-        yield number, solve(planner, rung, seconds=seconds, watch=table.watch)[0]
-
-
-def _kinematic(
-    problem: Problem,
-    planner: TaskPlanner,
-    numbers: Sequence[int],
-    options: dict[str, Any],
-    table: StepTable,
-    seconds: float,
-    *_: object,
-) -> Iterator[tuple[int, EpisodeResult]]:
-    """Episodes in which motion is planned, and states are set. `options`: of `ig2mj.demos.solving.Episodes`."""
-    from ig2mj.planning.kinematic import kinematic_episodes
-    from ig2mj.planning.solver import solve
-
-    pool = problem.pool(options["split"], max([0, *numbers]) + 1)
-    robot = {name: options[name] for name in ("robot", "seed", "doors_open")}
-    for number, rung in kinematic_episodes(planner.domain, problem, pool, numbers, **robot):
+    if kinematic:
+        robot = {name: options[name] for name in ("robot", "seed", "doors_open")}
+        episodes = kinematic_episodes(planner.domain, problem, pool, numbers, **robot)
+    else:
+        episodes = symbolic_episodes(planner.domain, problem.scene, pool, numbers, options["seed"])
+    for number, rung in episodes:
         table.begin([number])
         yield number, solve(planner, rung, seconds=seconds, watch=table.watch)[0]
 

@@ -174,13 +174,14 @@ PLANNER = "planner"
 
 def _planned(what: str, goal: str | None, robot: str, objects: tuple[str, ...], seed: int) -> Source:
     from ig2mj.cli.common.objects import note_changes
+    from ig2mj.cli.common.planning import EMPTY
     from ig2mj.planning.problem import problem_of
     from ig2mj.tasks.own_goal import split_goal_name
     from ig2mj.web.planning import Planned
 
-    home, wanted = split_goal_name(what) or (what, goal)
-    with_goal = wanted is not None or not _is_scene(home)
-    problem = problem_of(home, wanted if with_goal else "(and)", objects)
+    home, own_goal = split_goal_name(what) or (what, goal)
+    with_goal = own_goal is not None or not _is_scene(home)
+    problem = problem_of(home, own_goal if with_goal else EMPTY, objects)
     note_changes(problem.scene, objects)
     return Planned(problem, robot, seed=seed, goal=with_goal)
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import json
 import os
 import pathlib
 import re
@@ -22,7 +21,7 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from ig2mj.errors import InputError, UnknownNameError
-from ig2mj.files.content import read_text
+from ig2mj.files.content import read_json
 
 Kind = Literal["liquid", "granular", "visual"]
 KINDS: tuple[Kind, ...] = ("liquid", "granular", "visual")
@@ -99,12 +98,7 @@ def load_substances(file: str | os.PathLike) -> tuple[str, ...]:
     Raises:
       InputError: the file cannot be read, or an entry is wrong; it names the entry.
     """
-    text = read_text(pathlib.Path(file), fix="name a JSON file of substances")
-    try:
-        said = json.loads(text)
-    except ValueError as e:
-        raise InputError(file, f"is not JSON: {e}") from e
-    found = _read(said, file)
+    found = _read(read_json(file, fix="name a JSON file of substances"), file)
     for name, made in found.items():
         if substances().get(name, made) != made:
             raise InputError(file, "says otherwise than the substance that is known", element=name, fix="rename it")
@@ -115,7 +109,7 @@ def load_substances(file: str | os.PathLike) -> tuple[str, ...]:
 @functools.cache
 def _shipped() -> dict[str, Substance]:
     file = pathlib.Path(__file__).with_name("substances.json")
-    return _read(json.loads(file.read_text(encoding="utf-8")), file)
+    return _read(read_json(file), file)
 
 
 def _read(said: Any, file: str | os.PathLike) -> dict[str, Substance]:

@@ -13,14 +13,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import json
 import os
 import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ig2mj.errors import InputError, UnknownNameError
-from ig2mj.files.content import read_text
+from ig2mj.files.content import read_json
 from ig2mj.knowledge.substances import DERIVED, substance, substances
 
 ANY = "*"
@@ -92,12 +91,7 @@ def load_transitions(file: str | os.PathLike) -> tuple[str, ...]:
     Raises:
       InputError: the file cannot be read, or a rule is wrong; it names the rule.
     """
-    text = read_text(pathlib.Path(file), fix="name a JSON file of transition rules")
-    try:
-        said = json.loads(text)
-    except ValueError as e:
-        raise InputError(file, f"is not JSON: {e}") from e
-    found = _read(said, file)
+    found = _read(read_json(file, fix="name a JSON file of transition rules"), file)
     taken = {rule.name for rule in transitions()}
     for rule in found:
         if rule.name in taken:
@@ -110,7 +104,7 @@ def load_transitions(file: str | os.PathLike) -> tuple[str, ...]:
 @functools.cache
 def _shipped() -> tuple[Transition, ...]:
     file = pathlib.Path(__file__).with_name("transitions.json")
-    return tuple(_read(json.loads(file.read_text(encoding="utf-8")), file))
+    return tuple(_read(read_json(file), file))
 
 
 def _read(said: Any, file: str | os.PathLike) -> list[Transition]:
@@ -137,13 +131,13 @@ def _rule(entry: Any, number: int, file: str | os.PathLike) -> Transition:
     temperature, stir = entry.get("temperature", -float("inf")), entry.get("stir", False)
     if isinstance(temperature, bool) or not isinstance(temperature, int | float) or not isinstance(stir, bool):
         raise InputError(file, "has a temperature that is no number, or a stir that is no truth", element=element)
-    for wanted in (*inputs, output) if ANY not in output else ():
+    for required in (*inputs, output) if ANY not in output else ():
         try:
-            made = substance(wanted)
+            made = substance(required)
         except UnknownNameError as e:
             raise InputError(file, str(e), element=element) from e
         if not made.has_volume:
-            raise InputError(file, f"'{wanted}' covers objects, and is never in a container", element=element)
+            raise InputError(file, f"'{required}' covers objects, and is never in a container", element=element)
     if output in inputs:
         raise InputError(file, f"makes {output} of itself", element=element)
     return Transition(name, tuple(inputs), output, float(temperature), stir)

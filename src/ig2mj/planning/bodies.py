@@ -227,11 +227,11 @@ class HoveringBody(_Body):
     ) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"]]:
         """Displacement and turn of one hand in the body's frame."""
         base, quat = senses.base_quat, senses.hand_quat[:, number]
-        pos, wanted = goals_of_hand(senses, rows)
+        pos, required = goals_of_hand(senses, rows)
         grip = grip_of(senses, number, self.grips[number])
         move = np.where(rows["moves"][:, None] > 0, np.asarray(quat_rotate_inverse(base, pos - grip)), 0.0)
         move *= np.minimum(1.0, rows["speed"] / np.maximum(np.asarray(length(move)), 1e-6))[:, None]
-        left = np.asarray(quat_to_rotation_vector(quat_multiply(wanted, quat_conjugate(quat))))
+        left = np.asarray(quat_to_rotation_vector(quat_multiply(required, quat_conjugate(quat))))
         turn = np.where(rows["turns"][:, None] > 0, np.asarray(quat_rotate_inverse(base, left)), 0.0)
         turn *= np.minimum(1.0, HAND_TURN_STEP / np.maximum(np.asarray(length(turn)), 1e-6))[:, None]
         return move, turn

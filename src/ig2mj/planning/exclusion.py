@@ -24,7 +24,7 @@ def incompatible(facts: Facts, reading: Mapping[Atom, bool]) -> Collection[Atom]
     Args:
       reading: atoms and the truth that each is to have.
     """
-    true = [a for a, wanted in reading.items() if wanted]
+    true = [a for a, required in reading.items() if required]
     borne = [a for a in true if a.predicate in BORNE]
     rooms = [a for a in true if a.predicate == "on_floor" and a.arguments[1] in facts.domain.model.tables.room_names]
     for group, apart in ((rooms, _two_rooms), (borne, _stand_apart)):

@@ -67,7 +67,7 @@ class _Robot:
 
 
 class KinematicStage:
-    """One world of the scene with the robot, in which everything is put where it is wanted; see `Stage`."""
+    """One world of the scene with the robot, in which everything is put where it is required; see `Stage`."""
 
     agent, num_worlds = 0, 1
 

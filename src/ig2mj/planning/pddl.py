@@ -106,7 +106,7 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
     """
     domain = facts.domain
     tables = domain.model.tables
-    conditions = list(dict.fromkeys(plan.wanted))
+    conditions = list(dict.fromkeys(plan.required))
     named = {a for c in conditions for a in c.arguments} | {a for s in plan.steps for a in s.arguments}
     named |= set(facts.held)
     around = {c for n in named if n in tables.object_names for c in facts.containers(n)}

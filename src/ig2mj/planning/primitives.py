@@ -40,12 +40,12 @@ def navigate_to(world: PlannedWorld, step: Step) -> Primitive:
     """To where a hand reaches the object; a robot without hands that are planned, to near it."""
     if isinstance(world.body, WheeledBody):
         return Outcome(*(yield from drive_near(world, step.object)))
-    point, reason = world.com(step.object), "no_base"
-    hands = range(len(world.body.hands))
-    for stance in world.stances(max(hands), point, world.floor(), AWAY):
-        reason = yield from go(world, stance)
-        if not reason:
-            return Outcome()
+    reason, hand, floor = "no_base", len(world.body.hands) - 1, world.floor()
+    for point in (world.com(step.object), *world.rim(step.object)):
+        for stance in world.stances(hand, point, floor, AWAY):
+            reason = yield from go(world, stance)
+            if not reason:
+                return Outcome()
     return Outcome(reason, f"{step.object} is not within reach of free floor" if reason == "no_base" else "")
 
 

@@ -26,18 +26,18 @@ def quality(expression: Expression, start: Mapping[Atom, bool], end: Mapping[Ato
     """
 
     def counts(reading: Reading) -> tuple[int, int]:
-        wrong = [a for a, wanted in reading.items() if start[a] != wanted]
+        wrong = [a for a, required in reading.items() if start[a] != required]
         gained = sum(end[a] == reading[a] for a in wrong)
-        lost = sum(start[a] == wanted != end[a] for a, wanted in reading.items())
+        lost = sum(start[a] == required != end[a] for a, required in reading.items())
         return gained - lost, len(wrong)
 
     best = 0.0
     for _ in range(ROUNDS):  # a quotient is largest where gain - quotient * wrong has the maximum 0 (Dinkelbach)
 
-        def price(atom: Atom, wanted: bool, quotient: float = best) -> float:
-            if start[atom] == wanted:
-                return 0.0 if end[atom] == wanted else 1.0
-            return quotient - (1.0 if end[atom] == wanted else 0.0)
+        def price(atom: Atom, required: bool, quotient: float = best) -> float:
+            if start[atom] == required:
+                return 0.0 if end[atom] == required else 1.0
+            return quotient - (1.0 if end[atom] == required else 0.0)
 
         value, reading = cheapest(expression, price)
         if math.isinf(value):

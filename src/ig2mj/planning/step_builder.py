@@ -24,17 +24,17 @@ class StepBuilder:
     def __init__(
         self,
         facts: Facts,
-        wanted: Sequence[Condition],
+        required: Sequence[Condition],
         missing: Sequence[Condition],
         failed: Mapping[Condition, int],
         begun: Condition | None = None,
     ):
         """
         Args:
-          wanted, missing, failed: see `TaskPlan`, `TaskPlanner.plan`. begun: condition that the last step was for.
+          required, missing, failed: see `TaskPlan`, `TaskPlanner.plan`. begun: condition that the last step was for.
         """
         self._facts, self._domain, self._failed = facts, facts.domain, failed
-        self._wanted, self._begun = wanted, begun
+        self._required, self._begun = required, begun
         self.steps: list[Step] = []
         self._held = list(facts.held)
         self._open: dict[str, bool] = {}
@@ -44,7 +44,7 @@ class StepBuilder:
         for condition in ordered(missing, failed, self._held, self._tool, self._domain, begun):
             self._serves = condition
             self._make(condition)
-        for condition in wanted:  # what the steps themselves made false
+        for condition in required:  # what the steps themselves made false
             self._serves = condition
             if condition.predicate == "open" and condition.arguments[0] in self._open:
                 self._set_open(condition.arguments[0], condition.value)
@@ -100,7 +100,7 @@ class StepBuilder:
         tools = [t for t in (self._domain.knives if knife else self._domain.tools) if t != c.arguments[0]]
         if c.predicate == "stained":
             tools = [t for t in tools if self._domain.has(t, "soakable") or self._facts.holds("soaked", t)]
-        named = {a for w in self._wanted for a in w.arguments}
+        named = {a for w in self._required for a in w.arguments}
 
         def rank(tool: str) -> tuple:
             return (
@@ -254,7 +254,7 @@ class StepBuilder:
 
     def _placed_otherwise(self, name: str, c: Condition) -> list[Condition]:
         """Conditions of the reading on where an object is, but for one."""
-        return [w for w in self._wanted if w.value and w.predicate in PLACE and w.arguments[0] == name and w != c]
+        return [w for w in self._required if w.value and w.predicate in PLACE and w.arguments[0] == name and w != c]
 
     def _elsewhere(self, name: str, c: Condition) -> None:
         """Places the partner of a relation in another spot where all else holds of it: there may be no room next to
@@ -273,7 +273,7 @@ class StepBuilder:
             return None
         there = [
             w
-            for w in self._wanted
+            for w in self._required
             if (w.predicate, w.arguments[1:], w.value) == (rule.predicate, rule.arguments[1:], True)
             and w.arguments[0] != rule.arguments[0]
             and w.arguments[0] not in self._held
@@ -288,9 +288,11 @@ class StepBuilder:
         Of relations to objects that are still to be moved nothing is asked yet.
         """
         moved = {s.arguments[0] for s in self.steps if s.primitive in PLACE.values()}
-        later = {w.arguments[0] for w in self._wanted if w.value and w.predicate in PLACE and not self._true(w)} - moved
+        later = {
+            w.arguments[0] for w in self._required if w.value and w.predicate in PLACE and not self._true(w)
+        } - moved
         found = [c] if c.arguments[0] == mover else [dataclasses.replace(c, arguments=(mover, c.arguments[0]))]
-        for w in self._wanted:
+        for w in self._required:
             if w.predicate in PLACE and w.value and w.arguments[0] == mover and w != c and w.arguments[1] not in later:
                 found.append(w)
         ordered = sorted(found, key=lambda w: list(PLACE).index(w.predicate))
@@ -303,7 +305,7 @@ class StepBuilder:
         """Whether the plan places the object anyway, or will."""
         placed = any(s.primitive in PLACE.values() and s.arguments[0] == name for s in self.steps)
         return placed or any(
-            w.predicate in PLACE and w.value and w.arguments[0] == name and not self._true(w) for w in self._wanted
+            w.predicate in PLACE and w.value and w.arguments[0] == name and not self._true(w) for w in self._required
         )
 
     def _away(self, name: str, c: Condition) -> None:

@@ -152,10 +152,10 @@ def make_step(primitive: str, arguments: Sequence[str]) -> Step:
     """
     if primitive not in PRIMITIVES:
         raise UnknownNameError("primitive", primitive, PRIMITIVES)
-    wanted = PRIMITIVES[primitive].arguments
-    if len(arguments) != len(wanted):
+    required = PRIMITIVES[primitive].arguments
+    if len(arguments) != len(required):
         raise PlanningError(
-            f"primitive '{primitive}' takes {' and '.join(wanted)}, not {len(arguments)} "
+            f"primitive '{primitive}' takes {' and '.join(required)}, not {len(arguments)} "
             f"argument{'s' * (len(arguments) != 1)}"
         )
     return Step(primitive, tuple(arguments))

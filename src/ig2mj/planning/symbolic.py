@@ -195,8 +195,8 @@ class SymbolicRung:
         self._sampler.start_from(own.physics, own.states)
         try:
             around = self._around(step, self.facts(world), own.held)
-            wanted = list(step.adds if conditions is None else conditions)
-            row = self._sampler.sample(wanted, rng, Budget(WORK), rejected, around=around)
+            required = list(step.adds if conditions is None else conditions)
+            row = self._sampler.sample(required, rng, Budget(WORK), rejected, around=around)
         except (StateError, AbilityError) as e:
             return Outcome("not_true_after", str(e))
         if row is None:

@@ -49,12 +49,12 @@ class TaskPlan:
 
     Attributes:
       steps: in order; none for conditions that have failed `GIVE_UP` times.
-      missing: conditions of the reading that are false now. wanted: all conditions of the reading.
+      missing: conditions of the reading that are false now. required: all conditions of the reading.
     """
 
     steps: tuple[Step, ...]
     missing: tuple[Condition, ...]
-    wanted: tuple[Condition, ...]
+    required: tuple[Condition, ...]
 
     @property
     def done(self) -> bool:
@@ -90,9 +90,9 @@ class TaskPlanner:
         failed = failed or {}
         truth = facts.truth(self.goal.atoms)
 
-        def cost(atom: Atom, wanted: bool) -> float:
-            condition = condition_of(atom, wanted)
-            if truth[atom] == wanted:
+        def cost(atom: Atom, required: bool) -> float:
+            condition = condition_of(atom, required)
+            if truth[atom] == required:
                 return 0.0
             if self._reason(condition):
                 return math.inf
@@ -103,9 +103,9 @@ class TaskPlanner:
         value, reading = cheapest(self.goal.ground, cost, incompatible=together)
         if math.isinf(value):
             raise PlanningError(f"the goal cannot become true: {self._why_not(truth, cost, together)}")
-        wanted = tuple(condition_of(atom, wanted) for atom, wanted in reading.items())
-        missing = tuple(condition_of(atom, wanted) for atom, wanted in reading.items() if truth[atom] != wanted)
-        return TaskPlan(tuple(StepBuilder(facts, wanted, missing, failed, begun).steps), missing, wanted)
+        required = tuple(condition_of(atom, required) for atom, required in reading.items())
+        missing = tuple(condition_of(atom, required) for atom, required in reading.items() if truth[atom] != required)
+        return TaskPlan(tuple(StepBuilder(facts, required, missing, failed, begun).steps), missing, required)
 
     def _reason(self, condition: Condition) -> str:
         if condition not in self._impossible:
@@ -116,13 +116,13 @@ class TaskPlanner:
         """The first literal whose impossibility keeps the goal from becoming true, or literals that exclude each
         other."""
 
-        def barred(atom: Atom, wanted: bool) -> bool:
-            return truth[atom] != wanted and bool(self._reason(condition_of(atom, wanted)))
+        def barred(atom: Atom, required: bool) -> bool:
+            return truth[atom] != required and bool(self._reason(condition_of(atom, required)))
 
-        value, reading = cheapest(self.goal.ground, lambda atom, wanted: float(barred(atom, wanted)))
-        for atom, wanted in reading.items():
-            if not math.isinf(value) and barred(atom, wanted):
-                condition = condition_of(atom, wanted)
+        value, reading = cheapest(self.goal.ground, lambda atom, required: float(barred(atom, required)))
+        for atom, required in reading.items():
+            if not math.isinf(value) and barred(atom, required):
+                condition = condition_of(atom, required)
                 return f"{condition} is false, and {self._reason(condition)}"
         if (atom := contradiction(self.goal.ground, cost)) is not None:
             return f"{logic.text(atom)} would have to be both true and false"

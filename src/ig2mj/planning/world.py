@@ -182,6 +182,17 @@ class PlannedWorld:
         pieces = np.flatnonzero(tables.piece_object == self.index(name))
         return self.vertices_of_pieces(pieces)
 
+    def rim(self, name: str) -> Float[np.ndarray, "n 3"]:
+        """Corners of an object that are farthest from its centre of mass to each side, the nearest to the robot first,
+        at the height of its centre: what of a wide object is in reach from the floor around it."""
+        corners, centre = self.vertices(name), self.com(name)
+        angles = np.arange(8) * (np.pi / 4)
+        sides = np.stack([np.cos(angles), np.sin(angles)])
+        found = corners[np.unique((corners[:, :2] @ sides).argmax(axis=0))]
+        found[:, 2] = centre[2]
+        here, _ = self.base
+        return found[np.argsort(np.linalg.norm(found[:, :2] - here, axis=1))]
+
     def vertices_of_pieces(self, pieces: np.ndarray) -> Float[np.ndarray, "V 3"]:
         """Corners of collision pieces, world frame."""
         tables = self.domain.model.tables

@@ -166,13 +166,10 @@ def _read(out: pathlib.Path | None) -> list[Row]:
     for number, line in enumerate(out.read_text(encoding="utf-8").splitlines(), 1):
         try:
             row = json_module.loads(line)
-            missing = {"conditions", "primitive", "number"} - set(row)
-        except (ValueError, TypeError):
-            missing = {"all"}
-        if missing:
-            raise InputError(
-                out, "is not a result of a request", element=f"line {number}", fix="name another file"
-            ) from None
+        except ValueError:
+            row = None
+        if not isinstance(row, dict) or not {"conditions", "primitive", "number"} <= row.keys():
+            raise InputError(out, "is not a result of a request", element=f"line {number}", fix="name another file")
         found.append(row)
     return found
 
