@@ -48,6 +48,7 @@ PARSED_ONLY = {
     "ig2mj solve small_home '(inside": "takes a minute; run by tests of its own",
     "ig2mj calibrate": "takes minutes on a CPU",
     "ig2mj homes make": "takes half a minute; run by tests of its own",
+    "ig2mj homes tour": "renders thousands of images; run by tests of its own",
     "ig2mj sample my_home": "needs what the line before it makes",
     "ig2mj homes build": "takes minutes; run by `make homes-check`",
     "ig2mj homes images": "needs what the lines before it make",
