@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import pathlib
 import time
 from collections.abc import Collection, Mapping, Sequence
@@ -12,6 +11,7 @@ from typing import Any
 import mujoco
 
 from ig2mj.errors import InputError
+from ig2mj.process.own_version import own_version
 from ig2mj.scene.manifest import Manifest, check_manifest, save_manifest
 
 from .base.description import RoomMaps
@@ -33,7 +33,7 @@ FIRST_WARNINGS = 5
 def version_record(options: ConvertOptions) -> dict[str, Any]:
     """Converter, engine and options: with the source's hashes all that decides the output's bytes."""
     return {
-        "converter": f"ig2mj {importlib.metadata.version('ig2mj')}",
+        "converter": f"ig2mj {own_version()}",
         "mujoco": mujoco.__version__,
         "options": options.record(),
     }

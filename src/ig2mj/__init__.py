@@ -75,9 +75,9 @@ _HOME = {
 def __getattr__(name: str) -> Any:
     """Imports public names and packages when they are first used: `import ig2mj` loads neither MuJoCo nor JAX."""
     if name == "__version__":
-        from importlib.metadata import version
+        from ig2mj.process.own_version import own_version
 
-        return version("ig2mj")
+        return own_version()
     from ig2mj.process.public_names import public_name
 
     return public_name("ig2mj", name, _HOME)

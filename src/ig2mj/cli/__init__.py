@@ -196,9 +196,9 @@ def _dispatch(args: list[str]) -> int:
         print(_help())
         return 0 if args else 2
     if args[0] == "--version":
-        from importlib.metadata import version
+        from ig2mj.process.own_version import own_version
 
-        print(f"ig2mj {version('ig2mj')}")
+        print(f"ig2mj {own_version()}")
         return 0
     name, rest = args[0], args[1:]
     if name not in COMMANDS:

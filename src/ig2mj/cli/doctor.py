@@ -31,11 +31,11 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
 
 def _print_json(checks, ok: bool) -> None:
     import dataclasses
-    from importlib.metadata import version
 
     from ig2mj.cli.common.printing import print_json
+    from ig2mj.process.own_version import own_version
 
-    print_json({"ig2mj": version("ig2mj"), "ok": ok, "checks": [dataclasses.asdict(c) for c in checks]})
+    print_json({"ig2mj": own_version(), "ok": ok, "checks": [dataclasses.asdict(c) for c in checks]})
 
 
 def _print_table(checks, ok: bool) -> None:

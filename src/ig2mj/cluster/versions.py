@@ -8,13 +8,15 @@ import pathlib
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
+from ig2mj.process.own_version import own_version
+
 PACKAGES = ("jax", "jaxlib", "mujoco", "warp-lang", "numpy")
 
 
 @functools.cache
 def versions() -> dict[str, str]:
     """Versions by name; of ig2mj also a mark of its source files, since two checkouts may bear one number."""
-    found = {"Python": ".".join(platform.python_version_tuple()[:2]), "ig2mj": f"{_version('ig2mj')} ({_sources()})"}
+    found = {"Python": ".".join(platform.python_version_tuple()[:2]), "ig2mj": f"{own_version()} ({_sources()})"}
     return found | {name: _version(name) for name in PACKAGES}
 
 

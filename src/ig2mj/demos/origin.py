@@ -14,7 +14,6 @@ import math
 import os
 import platform
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,7 @@ from ig2mj.demos.model_hash import appearance_hash, physics_hash, whole_hash
 from ig2mj.demos.task_hash import task_hash, whole_task_hash
 from ig2mj.demos.writer import FORMAT_VERSION
 from ig2mj.envs.environment import Environment
+from ig2mj.process.own_version import own_version
 from ig2mj.scene.found_again import entries_of
 from ig2mj.scene.scene import Scene
 from ig2mj.states.added import STATES
@@ -122,7 +122,7 @@ def origin_of_machine() -> dict[str, Any]:
     model, features = _processor()
     return {
         "mujoco": mujoco.__version__,
-        "ig2mj": version("ig2mj"),
+        "ig2mj": own_version(),
         "jax": jax.__version__,
         "architecture": f"{platform.system()} {platform.machine()}",
         "processor": model,
