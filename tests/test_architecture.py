@@ -93,6 +93,7 @@ GUESTS = {
         "ig2mj.scene.mjcf_text",
         "ig2mj.errors",
         "ig2mj.install_hint",
+        "ig2mj.process.own_version",
         "ig2mj.files",
         "ig2mj.callbacks",
     ),
