@@ -24,8 +24,8 @@ CACHE_VARIABLE = "IG2MJ_CACHE_DIR"
 MODULES = 80
 """Approximate number of Warp modules that a home's step needs."""
 
-MIN_COMPILE_SECONDS = 0.1
-"""Seconds. Programs that XLA compiles faster are not cached."""
+MIN_COMPILE_SECONDS = 0.0
+"""Seconds. Programs that XLA compiles faster are not cached; dozens of small ones take 0.4 s of a rollout's start."""
 
 XLA_EVENT = "/jax/core/compile/backend_compile_duration"
 """JAX's event: a scalar at the start of a compilation or cache look-up, a duration at its end."""
