@@ -39,6 +39,7 @@ from ig2mj.calibration.pushing import push, start_pushing
 from ig2mj.engine.health import CAPACITY, Overflow
 from ig2mj.engine.warp import patches
 from ig2mj.engine.warp.engine import WarpEngine
+from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.worlds import Core, Rules
 
@@ -59,6 +60,9 @@ ACTS = {"Humanoid": (1, 0.5 / ACTION_STEPS)}
 humanoid goes at up to 1.5 m/s along each axis: at twice that boxes fly over walls, at the 0.5 m/s of the paper's
 activities it touches hardly anything. It acts in every control step: hands that are sent 0.15 m on ten times a second
 jump there at 5 m/s."""
+
+CAMERAS = {"camera": PLAIN, "camera_day": "day", "camera_night": "night", "agent": PLAIN}
+"""By `--what`: how images show the home."""
 
 ENGINES = {"ig2mj": contextlib.nullcontext, "mujoco_warp": patches.upstream_kernels}
 """Whose functions run on the device: with ours in place of some of MuJoCo Warp's, or MuJoCo Warp's alone."""
@@ -202,7 +206,7 @@ def _row(case: Case, each: Prepared, disturbed: bool) -> dict[str, Any]:
         **memory(num_worlds),
         "profile": [profile.awake_dofs, profile.constraints, profile.contacts, profile.convex_contacts],
         "mean_seen": float(np.asarray(each.seen).mean()),
-        "troubles": each.worlds.metrics(batch) if each.what in ("full", "camera", "agent") else {},
+        "troubles": each.worlds.metrics(batch) if each.what in ("full", *CAMERAS) else {},
     }
     if each.what == "agent":
         row["agent_steps_per_s"] = round(row["control_steps_per_s"] / AGENT_STEP)
@@ -227,8 +231,9 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
     engine = watch.engine
     seconds = engine.substeps * engine.timestep
     camera = None
-    if what in ("camera", "agent"):
-        camera = BatchCamera(engine, case.model, [case.eye], width=SIZE, height=SIZE, depth=True)
+    if what in CAMERAS:
+        size = {"width": SIZE, "height": SIZE}
+        camera = BatchCamera(engine, case.model, [case.eye], **size, depth=True, looks=CAMERAS[what])
 
     every, share = ACTS.get(case.robot.__name__ if case.robot else "", (ACTION_STEPS, 1.0))
     robot = robot_of(case.scene, every * seconds) if disturbed and case.robot is not None else None
@@ -247,7 +252,7 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
         batch, status = worlds.step_fn(batch, pusher.ctrl)
         seen = status.fraction.mean()
         view, physics = batch.world.view, batch.world.physics
-        if what == "camera":
+        if what in CAMERAS and what != "agent":
             seen += picture(batch)
         return (batch, pusher, view.object_com, view.agent.base_pos[:, 0]), (seen, watch.step(physics))
 
@@ -330,9 +335,9 @@ def main() -> None:
         "--what",
         nargs="+",
         default=["full"],
-        choices=["physics", "view", "full", "camera", "agent"],
-        help="several are timed in turns. full: with states, guards and goal; camera: and an image a control step; "
-        "agent: and one in three",
+        choices=["physics", "view", "full", *CAMERAS],
+        help="several are timed in turns. full: with states, guards and goal; camera: and an image a control step, of "
+        "the home by day or by night with camera_day and camera_night; agent: and one in three",
     )
     parser.add_argument("--engine", default="ig2mj", choices=ENGINES, help="mujoco_warp: without our kernels")
     parser.add_argument("--iterations", type=int, nargs="+", default=[0], help="solver limits to try; 0: the engine's")

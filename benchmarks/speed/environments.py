@@ -11,6 +11,8 @@ counted over all steps. Compilation is timed apart.
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import functools
 import pathlib
 import time
 from collections.abc import Callable
@@ -26,33 +28,69 @@ from benchmarks.harness.kernel_times import profiled
 from benchmarks.harness.turns import exclusive, preparing
 from benchmarks.speed.batch import device, memory
 from ig2mj.engine.warp.profile import EngineProfile
+from ig2mj.scene.scene import LOOKS
+from ig2mj.sensors.base import CAMERA_LOOKS
 
 CALL = 10
 """Agent steps of one call."""
 
 
-def run(name: str, num_worlds: int, args: argparse.Namespace) -> dict:
-    """One row."""
-    began = time.time()
+@dataclasses.dataclass
+class Prepared:
+    """An environment, the compiled function of `CALL` agent steps and its carry, and what was timed.
+
+    Attributes:
+      looks: how its images show the home. ready: s until it could be timed. times: s, of each call. totals: means of
+        what the steps of each call gave.
+    """
+
+    looks: str
+    env: Any
+    call: Callable[[Any], Any]
+    carry: Any
+    ready: float
+    times: list[float] = dataclasses.field(default_factory=list)
+    totals: list[list[float]] = dataclasses.field(default_factory=list)
+
+    def measure(self) -> None:
+        """One timed call."""
+        start = time.time()
+        self.carry, seen = jax.block_until_ready(self.call(self.carry))
+        self.times.append(time.time() - start)
+        self.totals.append([float(np.mean(s)) for s in seen])
+
+
+def run(name: str, num_worlds: int, args: argparse.Namespace) -> list[dict]:
+    """A row for each of `--looks`, whose calls are timed in turns."""
+    made = []
     with preparing(args.lock, args.patience):
-        env, call, carry = prepared(name, num_worlds, args)
-    ready = time.time() - began
+        for looks in args.looks:
+            began = time.time()
+            parts = prepared(name, num_worlds, looks, args)
+            made.append(Prepared(looks, *parts, ready=time.time() - began))
+    rows = []
     with exclusive(args.lock, args.patience):
-        carry, seen = jax.block_until_ready(call(carry))
-        times, totals = [], []
-        while len(times) < 2 or sum(times) < 60 * args.minutes:
-            start = time.time()
-            carry, seen = jax.block_until_ready(call(carry))
-            times.append(time.time() - start)
-            totals.append([float(np.mean(s)) for s in seen])
-        kernels: dict = {}
-        if args.kernels:
-            (carry, seen), kernels = profiled(lambda: call(carry), CALL, args.kernels, "agent step")
-    state = carry[0]
+        for each in made:
+            each.carry, _ = jax.block_until_ready(each.call(each.carry))
+        while len(made[0].times) < 2 or sum(sum(each.times) for each in made) < 60 * args.minutes * len(made):
+            for each in made:
+                each.measure()
+        for each in made:
+            kernels: dict = {}
+            if args.kernels:
+                call = functools.partial(each.call, each.carry)
+                (each.carry, _), kernels = profiled(call, CALL, args.kernels, "agent step")
+            rows.append(_row(name, num_worlds, each, kernels, args))
+    return rows
+
+
+def _row(name: str, num_worlds: int, each: Prepared, kernels: dict, args: argparse.Namespace) -> dict:
+    env, times, state = each.env, each.times, each.carry[0]
     steps = num_worlds * len(times) * CALL
-    reward, done, held, success = np.mean(totals, axis=0)
+    reward, done, held, success = np.mean(each.totals, axis=0)
     return {
         "environment": name,
+        "looks": each.looks,
         "label": args.label,
         "robot": args.robot,
         "grasping": args.grasping,
@@ -63,7 +101,7 @@ def run(name: str, num_worlds: int, args: argparse.Namespace) -> dict:
         "worlds": num_worlds,
         "agent_steps_per_s": round(steps / sum(times)),
         "ms_per_agent_step": round(1e3 * sum(times) / len(times) / CALL, 2),
-        "ready_s": round(ready, 1),
+        "ready_s": round(each.ready, 1),
         "physics_steps": 12 * (steps + num_worlds * CALL * (2 if kernels else 1)),
         **({"kernels": kernels} if kernels else {}),
         "metrics": env.metrics(state),
@@ -77,7 +115,7 @@ def run(name: str, num_worlds: int, args: argparse.Namespace) -> dict:
     }
 
 
-def prepared(name: str, num_worlds: int, args: argparse.Namespace) -> tuple[Any, Callable, Any]:
+def prepared(name: str, num_worlds: int, looks: str, args: argparse.Namespace) -> tuple[Any, Callable, Any]:
     """An environment, the compiled function of `CALL` agent steps, and the carry to begin with."""
     options: dict[str, Any] = {"profile": EngineProfile(*args.profile)} if args.profile else {}
     env = ig2mj.make(
@@ -88,6 +126,7 @@ def prepared(name: str, num_worlds: int, args: argparse.Namespace) -> tuple[Any,
         grasping=args.grasping,
         observations=("proprioception", "privileged_state", *args.observations),
         pool_size=args.pool_size,
+        looks=looks,
         **options,
     )
     size = env.action_space.shape[0]
@@ -127,6 +166,7 @@ def main() -> None:
     parser.add_argument("--engine")
     parser.add_argument("--worlds", type=int, nargs="+", default=[4096])
     parser.add_argument("--observations", nargs="*", default=[], help="besides proprioception and privileged state")
+    parser.add_argument("--looks", nargs="+", default=[CAMERA_LOOKS], choices=LOOKS, help="several are timed in turns")
     parser.add_argument("--minutes", type=float, default=0.2, help="of the timed calls of a row")
     parser.add_argument("--hold", type=int, default=5, help="mean number of agent steps that an action is held")
     parser.add_argument("--pool-size", type=int, help="rows of the pool; the task's own number if left out")
@@ -141,7 +181,7 @@ def main() -> None:
     args = parser.parse_args()
     for name in args.environments:
         for worlds in args.worlds:
-            results.keep_row(run(name, worlds, args), args.rows)
+            results.keep_rows(run(name, worlds, args), args.rows)
 
 
 if __name__ == "__main__":

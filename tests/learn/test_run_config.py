@@ -123,7 +123,13 @@ def test_a_file_that_is_none_is_refused_with_what_is_wrong(text, said, tmp_path)
 
 @pytest.mark.parametrize(
     ("change", "said"),
-    [("programs=3", "1 or 2"), ("gama=0.5", "gamma"), ("expert=maybe", "bool"), ("image_size=0", "at")],
+    [
+        ("programs=3", "1 or 2"),
+        ("gama=0.5", "gamma"),
+        ("expert=maybe", "bool"),
+        ("image_size=0", "at"),
+        ("looks=dusk", "day"),
+    ],
 )
 def test_settings_that_cannot_be_are_refused(change, said):
     with pytest.raises(Ig2mjError, match=said):

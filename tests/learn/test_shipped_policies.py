@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import ClassVar
 
 import jax
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -19,8 +22,9 @@ from ig2mj.learn import shipped
 from ig2mj.learn.bc import BC, BCConfig
 from ig2mj.learn.evaluate import draws
 from ig2mj.learn.perception import Perception
-from ig2mj.learn.policies import Policy, depends_of, world_of
+from ig2mj.learn.policies import Policy, depends_of, looks_of, world_of
 from ig2mj.learn.running_stats import RunningStats
+from ig2mj.sensors.base import SensorOptions, Space
 
 EVALUATION = {
     "split": "held_out",
@@ -149,3 +153,29 @@ def test_who_plays_a_policy_draws_its_actions_where_its_success_is_of_drawn_ones
     (added,) = ships.glob("*.npz")
     assert draws(Policy.load(added)) == drawn
     assert not draws(made()), "it was not evaluated"
+
+
+def test_a_card_says_with_which_looks_images_were_seen():
+    images = Perception({"rgb": Space((32, 32, 3), np.uint8, 0.0, 255.0)}, "rgbd")
+    world = {"task": "Toy", "robot": "dot", "grasping": "mitten", "actions": ["x"], "privileged": []}
+    plain, day = depends_of(world, images), depends_of({**world, "looks": "day"}, images)
+    assert "looks" not in plain and day == {**plain, "looks": "day"}
+    policies = [Policy({"depends": depends}, {}, np.zeros(1), np.ones(1)) for depends in (plain, day)]
+    assert [looks_of(policy) for policy in policies] == ["plain", "day"]
+    assert looks_of(made()) is None, "a policy that sees no images"
+    policies[0].check(Seeing("plain"), images)
+    with pytest.raises(PolicyMismatch, match="was made for looks = day; you asked for plain"):
+        policies[1].check(Seeing("plain"), images)
+    with pytest.raises(PolicyMismatch, match="was made for looks = plain; you asked for day"):
+        policies[0].check(Seeing("day"), images)
+
+
+class Seeing:
+    """As much of an environment with images as a policy is compared with."""
+
+    task = SimpleNamespace(name="Toy", code=None)
+    robot, grasping, action_names, privileged_names = "dot", "mitten", ("x",), ()
+    observation_spaces: ClassVar = {"rgb": Space((32, 32, 3), np.uint8, 0.0, 255.0)}
+
+    def __init__(self, looks: str):
+        self.sensor_options = SensorOptions(looks=looks)

@@ -75,7 +75,7 @@ def run(
     from ig2mj.envs.shared_starts import shared_pool, shipped_states
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.evaluate import evaluation_jobs, summary
-    from ig2mj.learn.policies import Policy, objects_of, robot_of
+    from ig2mj.learn.policies import Policy, looks_of, objects_of, robot_of
     from ig2mj.learn.shipped import find_policy
     from ig2mj.tasks.custom.files import refuse_unknown
     from ig2mj.tasks.pools import COUNT
@@ -109,6 +109,8 @@ def run(
         "pool_size": pool_size or None,
         "drawn": stochastic,
     }
+    if loaded.card["depends"].get("looks"):
+        settings["looks"] = looks_of(loaded)
     objects = object or objects_of(loaded, file)
     if objects:
         settings["objects"] = list(objects)

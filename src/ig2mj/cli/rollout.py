@@ -82,7 +82,7 @@ def run(
     from ig2mj.envs.rollout import play
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.install_hint import require_module
-    from ig2mj.learn.policies import objects_of
+    from ig2mj.learn.policies import looks_of, objects_of
     from ig2mj.process.progress import progress
 
     if format not in FORMATS:
@@ -115,6 +115,7 @@ def run(
         pool_size=pool_size or few_rows(env, split, max(episodes, worlds), objects) or None,
         variant=variant,
         objects=objects,
+        looks=None if policy is None else looks_of(policy),
     )
     note_changes(played.scene, objects)
     if record is not None:

@@ -170,6 +170,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
                 augment_starts=settings.augment_starts,
                 sensors=SensorOptions(rows=rendered_rows(settings.rows, settings.image_size)),
                 objects=chosen.objects,
+                looks=settings.looks,
             )
             note_changes(world.scene, chosen.objects)
         depth_range = settings.depth_range or depth_range_of(world)

@@ -26,7 +26,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
     from ig2mj.envs.registry import make
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.evaluate import acting
-    from ig2mj.learn.policies import Policy, objects_of, robot_of
+    from ig2mj.learn.policies import Policy, looks_of, objects_of, robot_of
     from ig2mj.learn.shipped import find_policy
     from ig2mj.showcase.film_strip import ENDINGS
     from ig2mj.tasks.custom.files import refuse_unknown
@@ -55,6 +55,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
         split="held_out",
         pool_size=max(ROWS, row + 1),
         objects=objects_of(policy, file),
+        looks=looks_of(policy),
     )
     act = acting(policy, env, file)
     if video is not None:

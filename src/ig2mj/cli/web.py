@@ -156,14 +156,15 @@ def _task(
     from ig2mj.cli.common.objects import note_changes
     from ig2mj.cli.rollout import AGENTS, policy_named, who_acts
     from ig2mj.envs.registry import VECTORS, make
-    from ig2mj.learn.policies import objects_of
+    from ig2mj.learn.policies import looks_of, objects_of
     from ig2mj.web.sources import Acting
 
     policy = None if agent in AGENTS else policy_named(agent)
     if policy is not None and not objects:
         objects = objects_of(policy, agent)
     seen = VECTORS if policy is None else policy.observations
-    env = make(name, robot, worlds, engine, observations=seen, objects=objects)
+    looks = None if policy is None else looks_of(policy)
+    env = make(name, robot, worlds, engine, observations=seen, objects=objects, looks=looks)
     note_changes(env.scene, objects)
     return Acting(env, who_acts(agent, policy, env, seed), seed)
 

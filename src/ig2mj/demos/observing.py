@@ -17,6 +17,7 @@ from ig2mj.demos.replay import Replayed, Replayer
 from ig2mj.demos.selection import some_runs
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import Ig2mjError, InputError
+from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.sensors.registry import SENSORS
 
@@ -99,7 +100,7 @@ def check_observations(replayer: Replayer) -> None:
 def _other_settings(replayer: Replayer) -> list[str]:
     recording = replayer.recording
     try:
-        recorded = SensorOptions.of(recording.value("sensors", dict))
+        recorded = SensorOptions.of({"looks": PLAIN, **recording.value("sensors", dict)})
     except Ig2mjError as e:
         raise InputError(recording.file, str(e), element="attribute sensors") from e
     before, now = dataclasses.asdict(recorded), dataclasses.asdict(replayer.env.sensor_options)

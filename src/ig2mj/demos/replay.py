@@ -43,6 +43,7 @@ from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.scene.changes import added
 from ig2mj.scene.found_again import requests_again
+from ig2mj.scene.scene import PLAIN
 from ig2mj.tasks.custom.files import refuse_unknown
 from ig2mj.tasks.task import Task
 
@@ -321,7 +322,7 @@ def _environment(recording: Recording, observations: str | Sequence[str], option
         if large:
             problem = f"{large[0]} = {sensors[large[0]]}, and {MOST_PIXELS} is the most"
             raise InputError(recording.file, problem, element="attribute sensors")
-        options = {**options, "sensors": sensors}
+        options = {**options, "sensors": {"looks": PLAIN, **sensors}}  # 0.1.0 has no other looks
     robot, grasping = recording.value("robot", str), recording.value("grasping", str)
     worlds, engine = recording.value("worlds", int), recording.value("engine", str)
     if not 0 < worlds <= MOST_WORLDS:

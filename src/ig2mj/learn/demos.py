@@ -30,7 +30,9 @@ from ig2mj.files.limits import refuse_bomb
 from ig2mj.files.npz import refuse_nonfinite
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.perception import Perception, Seen, blank
+from ig2mj.learn.policies import looks_in
 from ig2mj.process import entry_point
+from ig2mj.scene.scene import PLAIN
 from ig2mj.tasks.custom.code import IN_FILES
 
 LONGEST = 100_000
@@ -79,6 +81,8 @@ def _about(recording: Recording) -> tuple[dict[str, Any], dict[str, Space]]:
             raise InputError(recording.file, problem, element="attribute spaces", fix=_FIX) from e
     world = {name: recording.value(name, str) for name in ("task", "robot", "grasping")}
     world |= {name: recording.value(name, str) for name in IN_FILES if name in recording.header}
+    sensors = recording.value("sensors", dict) if "sensors" in recording.header else {}
+    world |= looks_in(spaces, str(sensors.get("looks", PLAIN)))
     return {**world, "actions": recording.value("action_names", list), "privileged": privileged}, spaces
 
 
@@ -95,6 +99,8 @@ def load_demos(file: str | os.PathLike, perception: Perception, world: Mapping[s
     """
     with Recording(find_recording(file)) as recording:
         own, spaces = _about(recording)
+        if perception.image_shape is None:
+            own.pop("looks", None)
         if world is not None:
             refuse_difference(recording.file, own, world)
         runs = [run for run in recording.runs if run.frames > 1 and run.complete]

@@ -101,6 +101,7 @@ def evaluate_job(
     episodes: int,
     shared: Mapping[str, bytes],
     objects: Sequence[str] = (),
+    looks: str | None = None,
 ) -> bytes:
     """Episodes from the start states `first` on, as JSON: how each ended, what went wrong, and how long it took until
     the first step was taken ("start_seconds").
@@ -113,8 +114,8 @@ def evaluate_job(
     began = time.monotonic()
     try:
         keep_pool(shared, task, split, pool_size, objects)
-        made = (task, robot, grasping, engine, worlds, tuple(observations), paper_rl, split, pool_size, tuple(objects))
-        env, actor = _player(shared["policy"], file, drawn, *made)
+        made = (task, robot, grasping, engine, worlds, tuple(observations), paper_rl, split, pool_size)
+        env, actor = _player(shared["policy"], file, drawn, *made, tuple(objects), looks)
     except Ig2mjError as e:
         raise WholeRunError(e) from e
     with progress(f"playing {task} from start state {first}") as report:
@@ -141,6 +142,7 @@ def _player(
     split: str,
     pool_size: int | None,
     objects: tuple[str, ...],
+    looks: str | None,
 ) -> tuple[Environment, Actor]:
     """The environment and its agent, the same in all jobs of an evaluation, so that they are compiled once.
 
@@ -153,6 +155,7 @@ def _player(
         "split": split,
         "pool_size": pool_size,
         "objects": objects,
+        "looks": looks,
     }
     env = make(task, robot, worlds, engine, grasping, **made)
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:

@@ -40,6 +40,7 @@ from ig2mj.learn.running_stats import RunningStats
 from ig2mj.process import entry_point
 from ig2mj.scene.changes import added
 from ig2mj.scene.found_again import entries_of, requests_again
+from ig2mj.scene.scene import PLAIN
 from ig2mj.tasks.added_objects import object_texts
 from ig2mj.tasks.custom.code import IN_FILES
 
@@ -60,7 +61,22 @@ def world_of(env: Any) -> dict[str, Any]:
         "grasping": getattr(env, "grasping", ""),
         "actions": list(getattr(env, "action_names", range(env.action_space.shape[0]))),
         "privileged": list(getattr(env, "privileged_names", ())),
+        **looks_in(env.observation_spaces, getattr(getattr(env, "sensor_options", None), "looks", PLAIN)),
     }
+
+
+def looks_in(spaces: Mapping[str, Any], looks: str) -> dict[str, str]:
+    """What `world_of` says of how cameras see the home: nothing where observations are no images, or it is plain."""
+    return {"looks": looks} if {"rgb", "depth"} & set(spaces) and looks != PLAIN else {}
+
+
+def looks_of(policy: Policy) -> str | None:
+    """How an environment's cameras must see the home for a policy (`ig2mj.make(looks=...)`); None: it sees no images.
+
+    A card that does not say so is of a policy that was trained on plain homes.
+    """
+    depends = policy.card["depends"]
+    return depends.get("looks", PLAIN) if depends["picture"] else None
 
 
 def objects_on_card(env: Any) -> dict[str, Any]:
@@ -99,6 +115,8 @@ def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, An
         found["rows"] = list(perception.rows)
     if shape and perception.depth_range != DEPTH_RANGE:
         found["depth_range"] = perception.depth_range
+    if shape and world.get("looks", PLAIN) != PLAIN:
+        found["looks"] = world["looks"]
     found["privileged"] = list(world["privileged"]) if perception.mode == "state" else []
     return found
 
@@ -226,7 +244,10 @@ class Policy:
 
     def check(self, env: Any, perception: Perception, file: object = "the policy") -> None:
         """Raises PolicyMismatch where the policy is for something else, with the pair that differs."""
-        refuse_difference(file, self.card["depends"], depends_on(env, perception), PolicyMismatch)
+        own, here = self.card["depends"], depends_on(env, perception)
+        if own["picture"]:
+            own, here = {"looks": PLAIN, **own}, {"looks": PLAIN, **here}
+        refuse_difference(file, own, here, PolicyMismatch)
 
     @property
     def weights_digest(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -36,6 +36,7 @@ class _Depends(msgspec.Struct):
     privileged: list[Name]
     rows: tuple[Count, Count] | None = None
     depth_range: Annotated[float, msgspec.Meta(gt=0, le=1e6)] | None = None
+    looks: Literal["day", "night", "plain"] | None = None
     task_file: Name | None = None
     task_code: Name | None = None
 

@@ -30,6 +30,8 @@ from ig2mj.learn.bc import BCConfig
 from ig2mj.learn.occlusion import OcclusionConfig
 from ig2mj.learn.settings import configure_all, written
 from ig2mj.learn.shipped import CHECKOUT, INSTALLED, find_policy
+from ig2mj.scene.scene import check_looks
+from ig2mj.sensors.base import CAMERA_LOOKS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,6 +68,7 @@ class RunSettings:
       image_size: height and width that the 128x128 images are averaged down to.
       image_rows: of these the first that the networks see and the first below those, e.g. 80,128; (): all.
       depth_range: m, that a byte of depth covers; 0: as the environment says.
+      looks: how cameras see the home, "day", "night" or "plain" (`ig2mj.load_scene`).
       pool_size: number of start states; 0: all of the split.
       augment_starts: train on this many start states made of those: every object lies where it does in one, turned as
         in another; 0: on those themselves.
@@ -79,6 +82,7 @@ class RunSettings:
     image_size: int = 32
     image_rows: tuple[int, ...] = ()
     depth_range: float = 0.0
+    looks: str = CAMERA_LOOKS
     pool_size: int = 0
     augment_starts: int = 0
     relaxed_thresholds: bool = False
@@ -189,6 +193,7 @@ def settings_of(
     run, algorithm, occlusion = configure_all(configs, changes, _elsewhere(algo), quiet)
     if run.programs not in (1, 2):
         raise Ig2mjError(f"programs={run.programs}: 1 or 2 are possible")
+    check_looks(run.looks)
     return run, algorithm, occlusion
 
 

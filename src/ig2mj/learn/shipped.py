@@ -17,7 +17,7 @@ from typing import Any
 from ig2mj.envs.names import NAMESPACE, VERSION
 from ig2mj.envs.registry import find_task
 from ig2mj.errors import InputError, UnknownNameError
-from ig2mj.learn.policies import Policy
+from ig2mj.learn.policies import Policy, looks_of
 from ig2mj.tasks.task import Task
 
 _HERE = pathlib.Path(__file__).resolve()
@@ -160,6 +160,7 @@ def model_card(name: str, policy: Policy) -> str:
     sees = ", ".join(policy.observations)
     if depends["picture"]:
         sees += f"; images averaged down to {depends['picture'][0]}x{depends['picture'][1]}"
+        sees += f", looks `{looks_of(policy)}`"
     rate = (
         f"{found['success_rate']:.1%} of {found['episodes']:,} held-out episodes, each from another start state "
         f"({found['success_low']:.1%} to {found['success_high']:.1%} with 95 % confidence)"
