@@ -175,6 +175,7 @@ class Seeing:
 
     task = SimpleNamespace(name="Toy", code=None)
     robot, grasping, action_names, privileged_names = "dot", "mitten", ("x",), ()
+    action_space = Space((1,), np.float32, -1.0, 1.0)
     observation_spaces: ClassVar = {"rgb": Space((32, 32, 3), np.uint8, 0.0, 255.0)}
 
     def __init__(self, looks: str):
