@@ -232,8 +232,7 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
     seconds = engine.substeps * engine.timestep
     camera = None
     if what in CAMERAS:
-        size = {"width": SIZE, "height": SIZE}
-        camera = BatchCamera(engine, case.model, [case.eye], **size, depth=True, looks=CAMERAS[what])
+        camera = BatchCamera(engine, case.model, [case.eye], width=SIZE, height=SIZE, depth=True, looks=CAMERAS[what])
 
     every, share = ACTS.get(case.robot.__name__ if case.robot else "", (ACTION_STEPS, 1.0))
     robot = robot_of(case.scene, every * seconds) if disturbed and case.robot is not None else None
