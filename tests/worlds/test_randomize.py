@@ -17,7 +17,8 @@ from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.states.model import StateModel
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.random_streams import episode_keys
-from ig2mj.worlds.randomize import VARIANTS, Physics, Randomization, Randomize
+from ig2mj.worlds.randomization import VARIANTS, Randomization
+from ig2mj.worlds.randomize import Physics, Randomize
 from ig2mj.worlds.rules import Rules
 
 WORLDS = 3
@@ -107,7 +108,7 @@ def test_without_it_worlds_have_no_fields_of_their_own(scene):
     core = made(scene, randomize=None)
     assert fields_of(core, core.start(5)) == {}
     assert Randomize.of(None) is None and Randomize.of({"physics": False}) is None
-    assert Randomize.of(Randomize(False)) is None
+    assert Randomize.of(Randomize(physics=False)) is None
 
 
 @pytest.mark.slow
@@ -153,6 +154,6 @@ def test_settings_come_back_from_files():
     assert kept == {"physics": {"mass": [0.5, 2.0], "friction": [0.5, 1.5], "damping": [0.5, 2.0]}}
     assert EnvConfig().override(randomize=kept).randomize == PHYSICS
     assert "randomize" not in EnvConfig().kept_in_files()
-    assert Randomize.of(ig2mj.Randomize(physics=True)) == Randomize(Physics())
+    assert Randomize.of(ig2mj.Randomize(physics=True)) == Randomize(physics=Physics())
     assert dataclasses.replace(config, randomize=None) == EnvConfig()
     assert jax.tree.leaves(kept)

@@ -21,6 +21,7 @@ from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.draw import Draw
 from ig2mj.worlds.plugin_states import plugin_defaults
 
 
@@ -32,6 +33,7 @@ class Frame:
       physics, states: of the worlds. controllers: state of the robots' controllers. grasps: what hands hold.
       measures: quantities of the task's reward. goal: truth of each literal of the goal.
       key: random key of the episode. step: control steps since its start. flags: `ig2mj.worlds.guards.Flag`.
+      draw: what was drawn for the episode.
     """
 
     physics: Snapshot
@@ -43,6 +45,7 @@ class Frame:
     key: UInt[Array, "W 2"]
     step: Int[Array, "W"]
     flags: Int[Array, "W"]
+    draw: Draw = Draw()
 
 
 def frame_of(engine: Engine, state: EnvState) -> Frame:
@@ -53,7 +56,7 @@ def frame_of(engine: Engine, state: EnvState) -> Frame:
 def _besides_physics(state: EnvState) -> tuple[Any, ...]:
     batch, world = state.batch, state.batch.world
     remembered = (world.states, batch.controllers, batch.grasps, state.measures)
-    return (*remembered, state.status.literals, world.key, world.step, batch.flags)
+    return (*remembered, state.status.literals, world.key, world.step, batch.flags, batch.draw)
 
 
 class FrameRows:
@@ -108,6 +111,7 @@ def resumed(env: Environment, frame: Frame, rows: Int[np.ndarray, "W"], used: En
         world=world,
         grasps=jax.tree.map(jnp.asarray, frame.grasps),
         flags=jnp.asarray(frame.flags),
+        draw=jax.tree.map(jnp.asarray, frame.draw),
     )
     state = env.resume(batch, rows)
     return dataclasses.replace(state, measures=jax.tree.map(jnp.asarray, frame.measures))

@@ -270,6 +270,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         starts = mixed_pool(task, scene, starts, config.augment_starts)
     options, differs = config.engine_options, config.randomize
     if differs is not None:
+        differs.check_finished()
         options = {**options, "model_fields": (*options.get("model_fields", ()), *differs.model_fields)}
     physics = make_engine(engine, scene, config.worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)

@@ -17,6 +17,7 @@ from ig2mj.sensors.base import Memory
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.objective import Measures
 from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.draw import Draw
 
 
 def metrics_of(info: Mapping[str, Array]) -> dict[str, Array]:
@@ -56,6 +57,11 @@ class EnvState:
     def done(self) -> Bool[Array, "W"]:
         """The episode is over."""
         return self.terminated | self.truncated
+
+    @property
+    def draw(self) -> Draw:
+        """What was drawn for the worlds' episodes (`ig2mj.Randomize`)."""
+        return self.batch.draw
 
     @property
     def metrics(self) -> dict[str, Array]:

@@ -15,6 +15,7 @@ from jaxtyping import Bool, Int
 from ig2mj.agents.grasping import GraspState
 from ig2mj.engine.view import Array, counted, length
 from ig2mj.states.world import WorldState
+from ig2mj.worlds.draw import Draw
 
 
 @struct.dataclass
@@ -28,6 +29,7 @@ class Batch:
       number: global number of each world; with several devices a batch is a part of all worlds.
       seed: of all random streams, or [W], of those of each world. episode: how often each world was reset.
       flags: `guards.Flag` of each world since its reset. troubles: how often each world was flagged, per flag.
+      draw: what was drawn for the episodes besides fields of the model; empty where nothing is.
     """
 
     world: WorldState
@@ -38,6 +40,7 @@ class Batch:
     episode: Int[Array, "W"]
     flags: Int[Array, "W"]
     troubles: Int[Array, "W K"]
+    draw: Draw = Draw()
 
     def __repr__(self) -> str:
         return counted(self, worlds=length(self.number))

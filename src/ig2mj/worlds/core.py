@@ -309,6 +309,7 @@ class Core:
             episode=nothing - 1,
             flags=nothing,
             troubles=jnp.zeros((count, len(guards.Flag)), jnp.int32),
+            draw=self.starts.no_draw(count),
         )
         return self.reset_fn(batch, jnp.ones(count, bool))
 
@@ -320,17 +321,17 @@ class Core:
         """`reset`, not compiled."""
         world = batch.world
         episode, key, row = self.starts.draw(batch.seed, batch.number, batch.episode, mask)
-        rows = self.starts.rows(row, key)
+        rows, draw = self.starts.rows(row, key)
         physics = self.engine.load(world.physics, rows.physics, mask)
         zero = jnp.zeros_like(world.step), jnp.zeros_like(world.time)
-        started = (rows.states, key, *zero, self.controls.first(), self.hands.read(physics))
-        going = (world.states, world.key, world.step, world.time, batch.controllers, batch.grasps)
-        states, key, step, time, controllers, grasps = self._select(mask, started, going)
+        started = (rows.states, key, *zero, self.controls.first(), self.hands.read(physics), draw)
+        going = (world.states, world.key, world.step, world.time, batch.controllers, batch.grasps, batch.draw)
+        states, key, step, time, controllers, grasps, draw = self._select(mask, started, going)
         view = self.cameras.placed(self.engine.view(physics), controllers)
         world = WorldState(physics=physics, view=view, states=states, key=key, step=step, time=time)
         flags = jnp.where(mask, 0, batch.flags)
         return dataclasses.replace(
-            batch, world=world, controllers=controllers, grasps=grasps, episode=episode, flags=flags
+            batch, world=world, controllers=controllers, grasps=grasps, episode=episode, flags=flags, draw=draw
         )
 
     # Changes from outside.

@@ -1,14 +1,10 @@
-"""`Randomize`: what differs between the worlds and the episodes of a batch, axis by axis, and `Randomization`, which
-draws it when an episode begins.
+"""`Randomize`: what differs between the worlds and the episodes of a batch, axis by axis.
 
-    env = ig2mj.make("CookingMeat", worlds=64, randomize=ig2mj.Randomize(physics=True))
+    env = ig2mj.make("CookingMeat", worlds=64, randomize=ig2mj.Randomize(physics=True, lights=True))
     env = ig2mj.make("CookingMeat", randomize=ig2mj.Randomize(physics=Physics(mass=(0.5, 2.0))))
+    env = ig2mj.make("CookingMeat", randomize={"camera": {"turn": 5.0}})
 
-All values follow from the episode's key (`random_streams.episode_keys`), and thereby from seed, world and episode:
-neither the engine nor the number of worlds matters. What is drawn becomes part of the world's physics (`ModelFields`),
-so that snapshots, recordings and replays have it. docs/design/randomization.md
-
-Axes: W worlds, V variants, O objects, B bodies, G geoms, nv degrees of freedom.
+`ig2mj.worlds.randomization` draws it when an episode begins. docs/design/randomization.md
 """
 
 from __future__ import annotations
@@ -16,35 +12,103 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
-import jax
-import jax.numpy as jnp
-import mujoco
-import numpy as np
-from jaxtyping import Float, UInt
-
-from ig2mj.engine.model_fields import MASSES, ModelFields, with_masses
-from ig2mj.engine.view import Array
+from ig2mj.engine.model_fields import MASSES
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.scene.tables import SceneTables
 
 Range = tuple[float, float]
 """Least and largest factor; factors between them are drawn evenly on a logarithmic scale."""
 
-VARIANTS = 64
-"""Sets of masses that are made when an environment is: what MuJoCo derives from masses is computed on the host. Each
-episode has one of them. Friction and damping are drawn freely."""
 
-VARIANT_SEED = 20_000_003
-"""Of the variants' masses: the same ones in every process."""
+class _Axis:
+    """Settings of an axis, which are checked when they are made.
 
-STREAMS = {"mass": 0x6D617373, "friction": 0x66726963, "damping": 0x64616D70}
-"""Folded into an episode's key, one for each quantity."""
+    Attributes:
+      model_fields: fields of the model that an engine must have for each world.
+    """
+
+    model_fields: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        """Raises EngineError: a setting is none."""
+        for field in dataclasses.fields(self):  # pyright: ignore[reportArgumentType]
+            value = getattr(self, field.name)
+            if isinstance(field.default, tuple):
+                object.__setattr__(self, field.name, _range(field.name, value))
+            else:
+                object.__setattr__(self, field.name, _number(field, value))
 
 
 @dataclasses.dataclass(frozen=True)
-class Physics:
+class Objects(_Axis):
+    """Models of the objects that a task adds to its home: others of the same category.
+
+    Attributes:
+      count: models of each object that an environment has in all its worlds; each costs memory.
+    """
+
+    count: int = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class ObjectPoses(_Axis):
+    """Poses of loose objects on what they stand on.
+
+    Attributes:
+      shift: m, largest displacement. turn: degrees, largest turn about the vertical.
+    """
+
+    shift: float = 0.05
+    turn: float = 180.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Materials(_Axis):
+    """Colours and textures, as iGibson's `texture_randomization` varies them.
+
+    Attributes:
+      colour: factors of each material's and each object's red, green and blue.
+      textures: probability that an object's material is exchanged for another one of its kind (wood, fabric, ...).
+    """
+
+    model_fields: ClassVar[tuple[str, ...]] = ("geom_rgba", "mat_rgba", "geom_matid")
+    colour: Range = (0.6, 1.3)
+    textures: float = 0.7
+
+
+@dataclasses.dataclass(frozen=True)
+class Lights(_Axis):
+    """The lamps of the home.
+
+    Attributes:
+      intensity: factors of each light's brightness. colour: factors of red, green and blue.
+      direction: degrees, largest turn of a light. off: probability that a light is off; one always stays on.
+    """
+
+    model_fields: ClassVar[tuple[str, ...]] = ("light_dir", "light_diffuse", "light_ambient", "light_specular")
+    intensity: Range = (0.6, 1.5)
+    colour: Range = (0.85, 1.18)
+    direction: float = 25.0
+    off: float = 0.25
+
+
+@dataclasses.dataclass(frozen=True)
+class Camera(_Axis):
+    """Pose and field of view of the robot's cameras. Predicates go by the usual pose.
+
+    Attributes:
+      shift: m, largest displacement. turn: degrees, largest turn about each axis.
+      fovy: factors of the tangent of half the vertical field of view.
+    """
+
+    shift: float = 0.02
+    turn: float = 3.0
+    fovy: Range = (0.92, 1.09)
+
+
+@dataclasses.dataclass(frozen=True)
+class Physics(_Axis):
     """Factors by which physics differs from the scene's.
 
     Attributes:
@@ -53,112 +117,149 @@ class Physics:
       damping: of the joints of objects (doors, drawers, lids).
     """
 
+    model_fields: ClassVar[tuple[str, ...]] = (*MASSES, "geom_friction", "dof_damping")
     mass: Range = (0.8, 1.25)
     friction: Range = (0.7, 1.4)
     damping: Range = (0.7, 1.4)
 
-    def __post_init__(self) -> None:
-        """Raises EngineError: a range is none."""
-        for field in dataclasses.fields(self):
-            _range(field.name, getattr(self, field.name))
+
+@dataclasses.dataclass(frozen=True)
+class RobotStart(_Axis):
+    """Pose of the robot's base at the start of episodes.
+
+    Attributes:
+      shift: m, largest displacement. turn: degrees, largest turn about the vertical.
+    """
+
+    shift: float = 0.05
+    turn: float = 5.0
+
+
+@dataclasses.dataclass(frozen=True)
+class SensorNoise(_Axis):
+    """Noise of observations. Each episode has a strength between 0 and 1, by which these deviations are multiplied.
+
+    Attributes:
+      rgb: standard deviation of each colour, of the whole range. depth: of each depth, as a share of it.
+      proprioception: of each number of what the robot feels.
+    """
+
+    rgb: float = 0.04
+    depth: float = 0.01
+    proprioception: float = 0.01
+
+
+@dataclasses.dataclass(frozen=True)
+class Instructions(_Axis):
+    """Wording of the task; those of the environment's split."""
+
+
+AXES: dict[str, type[_Axis]] = {
+    "objects": Objects,
+    "object_poses": ObjectPoses,
+    "materials": Materials,
+    "lights": Lights,
+    "camera": Camera,
+    "physics": Physics,
+    "robot_start": RobotStart,
+    "sensor_noise": SensorNoise,
+    "instructions": Instructions,
+}
+"""Settings of each axis, in the order of `Randomize`."""
+
+UNFINISHED: frozenset[str] = frozenset({"objects", "object_poses", "materials", "lights", "camera", "robot_start"})
+"""Axes that environments refuse."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Randomize:
-    """What differs between episodes; an axis that is False or None is as the scene has it.
+    """What differs between episodes; an axis that is False or None is as the scene has it, True takes the axis' usual
+    settings.
 
     Attributes:
-      physics: masses, friction and damping of objects; True: `Physics()`.
+      objects: models of the task's objects, of the same category.
+      object_poses: poses of loose objects.
+      materials: colours and textures.
+      lights: number, direction, intensity and colour of lights.
+      camera: pose and field of view of the robot's cameras.
+      physics: masses, friction and damping of objects.
+      robot_start: pose of the robot's base.
+      sensor_noise: noise of observations.
+      instructions: wording of the task.
     """
 
+    objects: bool | Objects | Mapping[str, Any] | None = None
+    object_poses: bool | ObjectPoses | Mapping[str, Any] | None = None
+    materials: bool | Materials | Mapping[str, Any] | None = None
+    lights: bool | Lights | Mapping[str, Any] | None = None
+    camera: bool | Camera | Mapping[str, Any] | None = None
     physics: bool | Physics | Mapping[str, Any] | None = None
+    robot_start: bool | RobotStart | Mapping[str, Any] | None = None
+    sensor_noise: bool | SensorNoise | Mapping[str, Any] | None = None
+    instructions: bool | Instructions | Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         """Raises EngineError, UnknownNameError: an axis is neither True nor settings of it."""
-        _physics(self.physics)
+        for name in AXES:
+            self.settings(name)
 
     @classmethod
     def of(cls, given: Any) -> Randomize | None:
-        """What `make(randomize=...)` takes: a `Randomize`, its settings by name, or nothing.
+        """What `make(randomize=...)` takes: a `Randomize`, its settings by name, names of axes, or nothing.
 
         Raises:
           EngineError: it is none of these. UnknownNameError: no such axis.
         """
         if given is None or isinstance(given, Randomize):
-            found = given and cls(physics=_physics(given.physics))
+            found = given
         elif isinstance(given, Mapping):
-            found = cls(**{name: _physics(value) for name, value in _known("axis of Randomize", given, cls).items()})
+            found = cls(**_known("axis of Randomize", given, cls))
+        elif isinstance(given, list | tuple | set | frozenset) and all(isinstance(name, str) for name in given):
+            found = cls(**_known("axis of Randomize", dict.fromkeys(given, True), cls))
         else:
             raise EngineError(f"randomize = {given!r}: ig2mj.Randomize(physics=True), or its settings by name")
-        return found if found is not None and found.axes else None
+        if found is None or not found.axes:
+            return None
+        return cls(**{name: found.settings(name) for name in AXES})
+
+    @classmethod
+    def every(cls) -> Randomize:
+        """All axes with their usual settings."""
+        return cls(**{name: kind() for name, kind in AXES.items()})
+
+    def settings(self, axis: str) -> Any:
+        """Settings of an axis; None: it is off. Raises EngineError, UnknownNameError: they are none."""
+        given, kind = getattr(self, axis), AXES[axis]
+        if isinstance(given, kind):
+            return given
+        if isinstance(given, Mapping):
+            return kind(**_known(f"setting of the axis {axis}", given, kind))
+        if given is None or isinstance(given, bool) or type(given).__name__ == "bool":
+            return kind() if given else None
+        if axis == "physics":
+            raise EngineError(f"randomize: physics = {given!r}: True, or Physics(mass=(0.8, 1.25), ...)")
+        raise EngineError(f"randomize: {axis} = {given!r}: True, or {kind.__name__}(...)")
 
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the axes that differ."""
-        return tuple(field.name for field in dataclasses.fields(self) if getattr(self, field.name))
+        return tuple(name for name in AXES if self.settings(name) is not None)
 
     @property
     def model_fields(self) -> tuple[str, ...]:
         """Fields of the model that an engine must have for each world."""
-        return (*MASSES, "geom_friction", "dof_damping") if self.physics else ()
+        return tuple(field for name in self.axes for field in AXES[name].model_fields)
 
     def as_dict(self) -> dict[str, Any]:
         """Its settings in plain values, for files; `of` reads them."""
-        settings = {"physics": _physics(self.physics)}
-        return {name: _plain(dataclasses.asdict(found)) for name, found in settings.items() if found is not None}
+        return {name: _plain(dataclasses.asdict(self.settings(name))) for name in self.axes}
 
-
-class Randomization:
-    """Draws the fields of a scene's model for episodes; `fields` may be part of a compiled program."""
-
-    def __init__(self, randomize: Randomize, model: mujoco.MjModel, tables: SceneTables):
-        """model, tables: of the scene with its robots."""
-        self.physics, whole = _physics(randomize.physics) or Physics(), _wholes(tables)
-        self._geom_object, self._objects = whole[tables.geom_object], len(tables.object_names)
-        self._friction = np.array(model.geom_friction, np.float32)
-        joint_object = whole[tables.body_object[model.jnt_bodyid]]
-        hinged = np.isin(model.jnt_type, [int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)])
-        self._dof_object = np.where(hinged, joint_object, -1)[model.dof_jntid]
-        self._damping = np.array(model.dof_damping, np.float32)
-        self._masses = _mass_variants(model, tables, whole, self.physics.mass)
-
-    def fields(self, key: UInt[Array, "W 2"]) -> ModelFields:
-        """Of worlds whose episodes have these keys."""
-        variant = jax.vmap(lambda k: jax.random.randint(jax.random.fold_in(k, STREAMS["mass"]), (), 0, VARIANTS))(key)
-        masses = {name: jnp.asarray(getattr(self._masses, name))[variant] for name in MASSES}
-        friction = self._factors(key, "friction", self.physics.friction, self._geom_object)
-        damping = self._factors(key, "damping", self.physics.damping, self._dof_object)
-        return ModelFields(
-            **masses, geom_friction=self._friction * friction[:, :, None], dof_damping=self._damping * damping
-        )
-
-    def _factors(self, key: UInt[Array, "W 2"], stream: str, between: Range, owner: np.ndarray) -> Float[Array, "W n"]:
-        """A factor for each entry of a field: its object's; 1 where `owner` is -1."""
-        low, high = (math.log(value) for value in between)
-
-        def draw(one: Array) -> Array:
-            return jax.random.uniform(
-                jax.random.fold_in(one, STREAMS[stream]), (self._objects,), minval=low, maxval=high
-            )
-
-        of_object = jnp.exp(jax.vmap(draw)(key))
-        return jnp.where(owner >= 0, of_object[:, np.maximum(owner, 0)], 1.0).astype(jnp.float32)
-
-
-def _wholes(tables: SceneTables) -> np.ndarray:
-    """[O + 1] the whole of each object, itself where it is no half; -1 at index -1."""
-    own = np.arange(len(tables.object_names))
-    return np.append(np.where(tables.object_part_of >= 0, tables.object_part_of, own), -1)
-
-
-def _mass_variants(model: mujoco.MjModel, tables: SceneTables, whole: np.ndarray, between: Range) -> ModelFields:
-    """The fields of masses, [V, ...]."""
-    owner = np.where(np.append(tables.object_fixed, True)[tables.body_object], -1, whole[tables.body_object])
-    low, high = (math.log(value) for value in between)
-    rng = np.random.default_rng(VARIANT_SEED)
-    of_object = np.exp(rng.uniform(low, high, (VARIANTS, len(tables.object_names))))
-    factor = np.where(owner >= 0, of_object[:, np.maximum(owner, 0)], 1.0)
-    return with_masses(model, model.body_mass * factor)
+    def check_finished(self) -> None:
+        """Raises EngineError: an axis that is on is not built yet."""
+        for name in self.axes:
+            if name in UNFINISHED:
+                built = ", ".join(axis for axis in AXES if axis not in UNFINISHED)
+                raise EngineError(f"randomize: the axis {name} does not work yet ({built} do)")
 
 
 def _range(name: str, given: Any) -> Range:
@@ -171,16 +272,21 @@ def _range(name: str, given: Any) -> Range:
     return low, high
 
 
-def _physics(given: Any) -> Physics | None:
-    """The axis `physics`. Raises EngineError, UnknownNameError."""
-    if isinstance(given, Mapping):
-        named = _known("setting of the axis physics", given, Physics)
-        return Physics(**{name: _range(name, value) for name, value in named.items()})
-    if given is None or isinstance(given, bool | np.bool_):
-        return Physics() if given else None
-    if not isinstance(given, Physics):
-        raise EngineError(f"randomize: physics = {given!r}: True, or Physics(mass=(0.8, 1.25), ...)")
-    return given
+_PROBABILITIES = ("off", "textures")
+
+
+def _number(field: dataclasses.Field[Any], given: Any) -> float | int:
+    """A setting that is no range. Raises EngineError."""
+    name, whole = field.name, isinstance(field.default, int)
+    try:
+        value = float(given)
+    except (TypeError, ValueError):
+        value = math.nan
+    if isinstance(given, bool) or not 0 <= value < math.inf or (whole and (value < 1 or value != int(value))):
+        raise EngineError(f"randomize: {name} = {given!r}: a number such as {field.default}")
+    if name in _PROBABILITIES and value > 1:
+        raise EngineError(f"randomize: {name} = {given!r}: a probability is between 0 and 1")
+    return int(value) if whole else value
 
 
 def _known(kind: str, given: Mapping[str, Any], of: type) -> dict[str, Any]:
@@ -192,4 +298,4 @@ def _known(kind: str, given: Mapping[str, Any], of: type) -> dict[str, Any]:
 
 
 def _plain(values: Any) -> Any:
-    return {name: list(value) for name, value in values.items()}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}

@@ -19,10 +19,12 @@ from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import ActionError, EngineError
 from ig2mj.worlds import guards
+from ig2mj.worlds.draw import Draw
 from ig2mj.worlds.plugin_states import completed
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds, episode_keys, pick_rows
-from ig2mj.worlds.randomize import Randomization, Randomize
+from ig2mj.worlds.randomization import Randomization
+from ig2mj.worlds.randomize import Randomize
 
 
 class Starts:
@@ -44,7 +46,7 @@ class Starts:
         self._engine, self._initial, self._given = engine, initial, pool
         self._draw = engine.compile(self._draw_fn)
         self._randomize = randomize
-        self._fields = engine.compile(lambda key: self.randomization.fields(key))
+        self._fields = engine.compile(lambda key: (self.randomization.fields(key), self.randomization.draw(key)))
 
     @functools.cached_property
     def pool(self) -> Pool:
@@ -62,12 +64,17 @@ class Starts:
         assert self._randomize is not None
         return Randomization(self._randomize, self._engine.scene.model, self._engine.tables)
 
-    def rows(self, row: Int[Array, "W"], key: UInt[Array, "W 2"]) -> Pool:
-        """Rows of the pool, with the fields of the model that episodes with these keys have."""
+    def rows(self, row: Int[Array, "W"], key: UInt[Array, "W 2"]) -> tuple[Pool, Draw]:
+        """Rows of the pool, with the fields of the model that episodes with these keys have; and what else is drawn."""
         rows = self.pool.rows(row)
         if self._randomize is None:
-            return rows
-        return dataclasses.replace(rows, physics=dataclasses.replace(rows.physics, model_fields=self._fields(key)))
+            return rows, Draw()
+        fields, draw = self._fields(key)
+        return dataclasses.replace(rows, physics=dataclasses.replace(rows.physics, model_fields=fields)), draw
+
+    def no_draw(self, worlds: int) -> Draw:
+        """As `rows` gives it, before any episode."""
+        return Draw() if self._randomize is None else self._fields(jnp.zeros((worlds, 2), jnp.uint32))[1]
 
     @functools.cached_property
     def floor(self) -> Float[np.ndarray, "O"]:
