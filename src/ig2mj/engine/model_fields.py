@@ -23,7 +23,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from flax import struct
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError, UnknownNameError
@@ -38,7 +38,8 @@ class ModelFields:
       body_mass, body_inertia (kg, kg m2), body_subtreemass, body_invweight0, dof_invweight0, dof_M0: masses, and what
         MuJoCo derives from them; to be made by `with_masses`.
       geom_friction: sliding, torsional, rolling. dof_damping: N s/m or N m s/rad.
-      geom_rgba, mat_rgba: colours, 0..1; seen where MuJoCo draws (`Engine.to_mujoco`).
+      geom_rgba, mat_rgba: colours, 0..1; seen where MuJoCo draws (`Engine.to_mujoco`) and by cameras.
+      geom_matid: material of each geom, -1 for none; likewise.
       cam_pos, cam_quat: poses of cameras in their bodies' frames (m, w-x-y-z).
     """
 
@@ -53,6 +54,7 @@ class ModelFields:
     dof_damping: Float[Array, "*W nv"] | None = None
     geom_rgba: Float[Array, "*W G 4"] | None = None
     mat_rgba: Float[Array, "*W M 4"] | None = None
+    geom_matid: Int[Array, "*W G"] | None = None
     cam_pos: Float[Array, "*W C 3"] | None = None
     cam_quat: Float[Array, "*W C 4"] | None = None
 
@@ -89,8 +91,13 @@ def check_names(names: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def own_fields(model: mujoco.MjModel, names: Iterable[str]) -> ModelFields:
-    """Fields of a model without the world axis, in float32."""
-    return ModelFields(**{name: np.array(getattr(model, name), np.float32) for name in names})
+    """Fields of a model without the world axis, in float32 or int32."""
+    return ModelFields(**{name: np.array(getattr(model, name), dtype_of(name)) for name in names})
+
+
+def dtype_of(name: str) -> type:
+    """Of a field in engines' arrays."""
+    return np.int32 if name == "geom_matid" else np.float32
 
 
 def check_written(fields: ModelFields | None, names: tuple[str, ...], model: mujoco.MjModel, worlds: int) -> None:

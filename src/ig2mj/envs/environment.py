@@ -22,6 +22,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
@@ -47,6 +48,7 @@ from ig2mj.tasks.objective import Measures, Objective
 from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.batch import Batch, select_worlds
 from ig2mj.worlds.core import Core
+from ig2mj.worlds.draw import Draw
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seed, Seeds, as_seed, pick_rows
 from ig2mj.worlds.starts import checked_mask
@@ -250,8 +252,34 @@ class Environment(StateCopies, StateImages, Configured):
         with GC_PAUSED:
             return self._load(self.core.engine.reset(), as_seed(seed, self.num_worlds), starts, rows.astype(np.int32))
 
+    def start_with(
+        self, starts: Pool, draw: Draw | None = None, rows: Int[np.ndarray, "W"] | None = None, seed: Seed = 0
+    ) -> EnvState:
+        """All worlds at the start of an episode from states of their own, whatever the pool has.
+
+        Args:
+          starts: W rows, with fields of the model where worlds differ in them. draw: what was drawn for these episodes;
+            None: what the seed says. rows: numbers that the episodes count as; None: 0.
+
+        Raises:
+          EngineError: not one row for each world, or of another scene, or `draw` has other axes than the environment.
+        """
+        if starts.size != self.num_worlds:
+            raise EngineError(f"start_with takes {self.num_worlds} start states, not {starts.size}")
+        rows = np.zeros(self.num_worlds, np.int32) if rows is None else np.asarray(rows, np.int32)
+        with GC_PAUSED:
+            state = self._load(self.core.engine.reset(), as_seed(seed, self.num_worlds), starts, rows)
+            if draw is None:
+                return state
+            if jax.tree.map(np.shape, draw) != jax.tree.map(np.shape, state.batch.draw):
+                raise EngineError("the draw has other axes or numbers of worlds than the environment (randomize=...)")
+            batch = dataclasses.replace(state.batch, draw=jax.tree.map(jnp.asarray, draw))
+            return self._resume(batch, np.ones(self.num_worlds, bool), None, rows)
+
     def _load_fn(self, physics: Physics, seed: Seeds, starts: Pool, rows: Int[Array, "W"]) -> EnvState:
-        batch = self.core.load_fn(self.core.start_fn(physics, seed), starts.physics, starts.states)
+        batch = self.core.start_fn(physics, seed)
+        starts, draw = self.core.starts.drawn(starts, batch.world.key)
+        batch = dataclasses.replace(self.core.load_fn(batch, starts.physics, starts.states), draw=draw)
         return self._begun(batch, jnp.ones(self.num_worlds, bool), None, rows)
 
     def resume(
@@ -296,7 +324,7 @@ class Environment(StateCopies, StateImages, Configured):
     ) -> EnvState:
         """A state with its images. `begun`: worlds that were reset since `before`; the others keep its images."""
         last = None if before is None else (before.obs, before.memory)
-        images, memory = self._observer.images(batch.world, batch.controllers[0], last, begun)
+        images, memory = self._observer.images(batch.world, batch.controllers[0], last, begun, batch.draw)
         obs = {name: {**seen.obs, **images}[name] for name in self.observation_spaces}
         of_step = (seen.reward, seen.terminated, seen.truncated, seen.info, seen.measures, seen.status)
         return EnvState(batch, obs, *of_step, bad.astype(jnp.int32), memory)

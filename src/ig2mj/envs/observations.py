@@ -18,19 +18,22 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.engine.view import Array
 from ig2mj.envs.state import StepContext
 from ig2mj.errors import PluginError, UnknownNameError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.sensors.base import Memory, Space
+from ig2mj.sensors.noise import noisy
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.states.world import WorldState
 from ig2mj.tasks.objective import Measures, Objective
 from ig2mj.worlds.batch import select_worlds
+from ig2mj.worlds.draw import Draw
 from ig2mj.worlds.random_streams import step_keys
+from ig2mj.worlds.randomize import SensorNoise
 
 __all__ = ["Observer", "Space", "check_names"]
 
@@ -60,16 +63,26 @@ class Observer:
       spaces: of each observation. sensor_options: settings of the sensors.
     """
 
-    def __init__(self, names: Sequence[str], objective: Objective, sensors: SensorSuite):
+    def __init__(
+        self, names: Sequence[str], objective: Objective, sensors: SensorSuite, noise: SensorNoise | None = None
+    ):
         """
         Args:
           names: of sensors and of the objective's vectors. sensors: those of `check_names`.
+          noise: of observations, where it differs between episodes; None: there is none.
         """
         vectors = {name: len(numbers) for name, numbers in objective.vectors.items()}
         self._names, self._objective, self._sensors = tuple(names), objective, sensors
         every = {name: Space((count,), np.float32, -np.inf, np.inf) for name, count in vectors.items()} | sensors.spaces
         self.spaces, self.sensor_options = {name: every[name] for name in names}, sensors.options
-        self._keys = jax.jit(step_keys)
+        self._keys, self._noise = jax.jit(step_keys), noise
+        self._noisy = jax.jit(self._noisy_fn)
+
+    def _noisy_fn(
+        self, readings: Mapping[str, Array], strength: Array, key: UInt[Array, "W 2"], step: Int[Array, "W"]
+    ) -> dict[str, Array]:
+        assert self._noise is not None
+        return noisy(readings, self.spaces, self._noise, strength, step_keys(key, step))
 
     def prepare_devices(self, devices: Sequence[Any]) -> None:
         """See `SensorSuite.prepare_devices`."""
@@ -88,6 +101,11 @@ class Observer:
         found = self._sensors.feel_fn(view, states, context.controllers[0])
         made = self._objective.observe(view, states, measures, status, time_left)
         found |= {name: array for name, array in made.items() if name in self._names}
+        if self._noise is not None and context.draw.noise is not None and context.key is not None:
+            felt = {name: found[name] for name in found if name in self.spaces}
+            found |= noisy(
+                felt, self.spaces, self._noise, context.draw.noise, step_keys(context.key, context.control_steps)
+            )
         return {name: jnp.nan_to_num(jnp.asarray(a, jnp.float32), posinf=0.0, neginf=0.0) for name, a in found.items()}
 
     def images(
@@ -96,12 +114,14 @@ class Observer:
         controller_state: Any,
         last: tuple[Mapping[str, Array], Memory | None] | None,
         begun: Bool[Array, "W"] | None = None,
+        draw: Draw | None = None,
     ) -> tuple[dict[str, Array], Memory | None]:
         """Readings of cameras and lasers, and what those of the next step need to know (`SensorSuite.look_fn`).
 
         Args:
           last: observations and memory of the last step, or of before a reset; None at the start.
           begun: worlds that have just been reset; the others keep the readings of `last`. None: there was no reset.
+          draw: what was drawn for the worlds' episodes.
         """
         if not self._sensors.looks:
             return {}, None
@@ -112,8 +132,10 @@ class Observer:
         before = None if begun is None or last is None else last[0]
         rendered = None if before is None else begun
         found, memory = self._sensors.look_fn(
-            world.physics, world.view, world.states, controller_state, memory, keys, rendered
+            world.physics, world.view, world.states, controller_state, memory, keys, rendered, draw
         )
+        if self._noise is not None and draw is not None and draw.noise is not None:
+            found = self._noisy(found, draw.noise, world.key, world.step)
         if begun is not None and before is not None:
             found = select_worlds(begun, found, {name: before[name] for name in found})
         return found, memory

@@ -276,8 +276,9 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
     every_number = whole or isinstance(task, BddlTask)  # of the action; some ask hands back
     core = Core(physics, rules, starts, controllers, hands, hand_resets=every_number, randomize=config.randomize)
-    perceived = SensorSuite(physics, scene, rules.model, controllers[0], known, settings)
-    observer = Observer(names, objective, perceived)
+    varied = () if differs is None else differs.axes
+    perceived = SensorSuite(physics, scene, rules.model, controllers[0], known, settings, varied=varied)
+    observer = Observer(names, objective, perceived, None if differs is None else differs.settings("sensor_noise"))
     resolved = dataclasses.replace(
         config,
         robot=robot,

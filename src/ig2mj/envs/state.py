@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from flax import struct
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.engine.view import Array, PhysicsView, length
 from ig2mj.predicates.compile import GoalStatus
@@ -84,6 +84,7 @@ class StepContext:
     Attributes:
       view, states: of the worlds. controllers: states of the robots' controllers. flags: `guards.Flag` of each world.
       control_steps: of the episode, so far. action: of the step; None at the start of episodes.
+      draw: noise that was drawn for the episodes. key: theirs, where observations have noise.
     """
 
     view: PhysicsView
@@ -92,12 +93,16 @@ class StepContext:
     flags: Int[Array, "W"]
     control_steps: Int[Array, "W"]
     action: Float[Array, "W n"] | None = None
+    draw: Draw = Draw()
+    key: UInt[Array, "W 2"] | None = None
 
     @classmethod
     def of(cls, batch: Batch, action: Array | None = None) -> StepContext:
         """Of the worlds of a batch."""
         world = batch.world
-        return cls(world.view, world.states, batch.controllers, batch.flags, world.step, action)
+        noise = Draw(noise=batch.draw.noise)
+        key = None if noise.noise is None else world.key
+        return cls(world.view, world.states, batch.controllers, batch.flags, world.step, action, noise, key)
 
 
 @struct.dataclass

@@ -12,7 +12,7 @@ Axes: W worlds, C cameras, Y rows, X columns, G geoms of the scene, S slots.
 from __future__ import annotations
 
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -42,6 +42,7 @@ from ig2mj.sensors.texture_filter import fit_textures
 from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.draw import SPARE_LIGHTS, Draw
 
 TILE = 8
 """Pixels a side of what a block of 64 threads sees: a third faster than rows of 64 pixels."""
@@ -77,6 +78,7 @@ class BatchCamera:
         merge_meshes: bool = True,
         rows: tuple[int, int] | None = None,
         looks: str = PLAIN,
+        varied: Collection[str] = (),
     ):
         """Compiles the render model.
 
@@ -97,6 +99,7 @@ class BatchCamera:
           rows: of each image the first that is made and the first below those; the others are as if nothing were
             there, and cost nothing. None: all.
           looks: how the home is seen: one of `ig2mj.scene.scene.LOOKS`.
+          varied: what of `Draw` differs between worlds, of "lights" and "camera"; each call then takes it.
 
         Raises:
           EngineError: not the Warp engine, or nothing is to be made. UnknownNameError: no such camera.
@@ -111,12 +114,20 @@ class BatchCamera:
         self._lines = height if pins.obstacles() else self._shown[1] - self._shown[0]
         self._sectors = sectors_of(rays)
         self._patterns = {pattern.name: len(pattern.directions) for pattern in rays}
-        self._host = host = make_render_model(engine.scene, particles, [s.camera for s in self._sectors], looks)
+        self._lit, self._zooms = "lights" in varied, "camera" in varied
+        if (self._lit or self._zooms) and (obstacle := pins.obstacles()):
+            raise EngineError(f"lights and fields of view are the same in all worlds here: {obstacle}")
+        sectors = [s.camera for s in self._sectors]
+        self._host = host = make_render_model(engine.scene, particles, sectors, looks, self._lit)
         self.cameras = [_camera_id(host, name) for name in cameras]
         if rgb and cameras:
             fit_textures(host, float(2 * np.tan(np.deg2rad(host.cam_fovy[self.cameras].min()) / 2) / height))
         self._plan(host)
         self._model = mjx.put_model(host, own_device(), impl="warp")
+        if self._lit:  # the last light only carries the colour of the one at the camera
+            self._model = self._model.replace(light_active=self._model.light_active.at[-1].set(False))
+        if self._zooms:
+            self._model = self._model.replace(cam_fovy=jnp.ones_like(self._model.cam_fovy))
         self._merged = self._merge(groups) if merge_meshes and mergeable(host) and not pins.obstacles() else None
         data = mujoco.MjData(host)
         mujoco.mj_forward(host, data)
@@ -159,15 +170,22 @@ class BatchCamera:
         if self._merged is not None:
             from ig2mj.sensors.ray_caster import use_merged
 
-            use_merged(contexts, self._host, self._merged, self.engine.num_worlds)
+            use_merged(contexts, self._host, self._merged, self.engine.num_worlds, self._changes)
         elif not pins.obstacles():
             from ig2mj.sensors.shading import limit_light
 
             for context in contexts:
-                limit_light(context, self._host.nlight)
+                limit_light(context, self._host.nlight, changes=self._changes)
         self._handle = self._context.pytree()
         self._check_addresses()
         self._tiled = self._order_rays()
+
+    @property
+    def _changes(self) -> list[tuple[str, str]]:
+        """Of the kernel, for what differs between worlds."""
+        from ig2mj.sensors.shading import FOV_PER_WORLD, LIGHTS_PER_WORLD
+
+        return [*(LIGHTS_PER_WORLD if self._lit else ()), *(FOV_PER_WORLD if self._zooms else ())]
 
     def _merge(self, groups: Sequence[int]) -> Tables | None:
         """Hides the geoms that merged meshes show, and those that nobody sees, from the ray caster's boxes; None where
@@ -191,6 +209,7 @@ class BatchCamera:
         states: ExtendedStates,
         eyes: Mapping[str, Pose] | None = None,
         rendered: Bool[Array, "W"] | None = None,
+        draw: Draw | None = None,
     ) -> Images:
         """Images of the present state of every world. Pure: to be jitted, alone or with a step.
 
@@ -198,13 +217,15 @@ class BatchCamera:
           eyes: poses in the world of cameras that do not ride on their bodies, by name: what `Controller.eye` of an
             agent gives that moves its eye without joints. Poses of all ray patterns, by their names.
           rendered: the worlds that matter; None: all. See `images.Camera`.
+          draw: lights and fields of view of the worlds, where they differ.
 
         Raises:
           UnknownNameError: there is no such camera.
         """
         slots = fill_slots(self.model, states, view, self.slots)
-        moved = self._moved(physics, slots, eyes or {}, rendered)
-        look = self._look(physics, states, slots)
+        draw = draw or Draw()
+        moved = self._moved(physics, slots, eyes or {}, rendered, draw)
+        look = self._look(physics, states, slots) | self._of_draw(draw)
 
         def cast(data: Any, look: dict[str, Array]) -> tuple[Array, Array, Array]:
             model = self._model.replace(**look)
@@ -296,7 +317,12 @@ class BatchCamera:
         self._light_in_body = (host.light_bodyid, _f32(host.light_pos), _f32(host.light_dir))
 
     def _moved(
-        self, physics: MjxPhysics, slots: Slots, eyes: Mapping[str, Pose], rendered: Bool[Array, "W"] | None
+        self,
+        physics: MjxPhysics,
+        slots: Slots,
+        eyes: Mapping[str, Pose],
+        rendered: Bool[Array, "W"] | None,
+        draw: Draw,
     ) -> Any:
         """Render data [W] with everything where physics has it, and cameras out of the way where nothing is drawn."""
         data, worlds = physics.data, self.engine.num_worlds
@@ -318,6 +344,8 @@ class BatchCamera:
         light_quat = data.xquat[:, body]
         light_pos = data.xpos[:, body] + quat_rotate(light_quat, jnp.asarray(pos))
         light_dir = quat_rotate(light_quat, jnp.asarray(direction))
+        if self._lit and draw.light_quat is not None:
+            light_dir = quat_rotate(self._of_lights(draw.light_quat), light_dir)
         added_pos, added_mat = self._of_looks(data)
         spread = jax.vmap(lambda time: self._template.replace(time=time))(jnp.zeros(worlds, jnp.float32))
         return spread.tree_replace(
@@ -347,6 +375,9 @@ class BatchCamera:
         worlds, geoms = self.engine.num_worlds, len(self._mean) - self.slots
         tint = tints_of_geoms(tints(self.model, states), self._owner[:geoms])
         own = physics.fields.geom_rgba
+        fields, base = physics.fields, jnp.asarray(self._material[:geoms])
+        if fields.geom_matid is not None:
+            base = jnp.broadcast_to(base, (worlds, geoms)).at[:, : fields.geom_matid.shape[-1]].set(fields.geom_matid)
         rgba = jnp.broadcast_to(jnp.asarray(self._rgba[:geoms]), (worlds, geoms, 4))
         if own is not None:
             rgba = rgba.at[:, : own.shape[-2]].set(own)
@@ -354,14 +385,47 @@ class BatchCamera:
         in_tint = jnp.concatenate([tinted(mean[:, :3], tint), jnp.broadcast_to(mean[:, 3:], (*tint.shape, 1))], axis=-1)
         rgba = jnp.where((tint == UNTINTED)[..., None], rgba, in_tint)
         of_slots = jnp.concatenate([slots.colour, jnp.ones_like(slots.colour[..., :1])], axis=-1)
-        material = jnp.where(tint == UNTINTED, jnp.asarray(self._material[:geoms]), -1)
+        material = jnp.where(tint == UNTINTED, base, -1)
         plain = jnp.full((worlds, self.slots), -1, material.dtype)
         size = jnp.broadcast_to(jnp.asarray(self._size[:geoms]), (worlds, geoms, 3))
-        return {
+        more = {}
+        if (own := fields.mat_rgba) is not None:
+            added = jnp.broadcast_to(
+                self._model.mat_rgba[own.shape[-2] :], (worlds, self._host.nmat - own.shape[-2], 4)
+            )
+            more["mat_rgba"] = jnp.concatenate([own, added], axis=1)
+        return more | {
             "geom_rgba": jnp.concatenate([rgba, of_slots], axis=1),
             "geom_matid": jnp.concatenate([material, plain], axis=1),
             "geom_size": jnp.concatenate([size, slots.size], axis=1),
         }
+
+    def _of_draw(self, draw: Draw) -> dict[str, Array]:
+        """Fields of the model that lights and fields of view are."""
+        found = {}
+        if self._lit:
+            colour = jnp.ones((self.engine.num_worlds, 1, 3)) if draw.light_colour is None else draw.light_colour
+            of_lights = self._of_lights(colour)
+            if draw.light_colour is None:  # no spare ones
+                of_lights = of_lights.at[:, -1 - SPARE_LIGHTS : -1].set(0.0)
+            own, last = of_lights[:, :-1], of_lights[:, -1:]
+            for name in ("light_diffuse", "light_specular", "light_ambient"):
+                found[name] = jnp.concatenate([getattr(self._model, name)[:-1] * own, last], axis=1)
+        if self._zooms and draw.camera_slope is not None:
+            wide = jnp.ones((self.engine.num_worlds, self._host.ncam))
+            found["cam_fovy"] = wide.at[:, np.array(self.cameras, int)].set(draw.camera_slope[:, None])
+        return found
+
+    def _of_lights(self, drawn: Float[Array, "W N k"]) -> Float[Array, "W L k"]:
+        """What is drawn of lights, in the order of the render model's: the home's, what looks add, spare ones, that at
+        the camera."""
+        known, count = self.engine.scene.model.nlight, self._host.nlight
+        at = np.zeros(count, int)
+        if drawn.shape[1] > 1:
+            at[:known] = 1 + np.arange(known)
+            at[known:] = 1  # as the home's first
+            at[-1 - SPARE_LIGHTS :] = [*(1 + known + np.arange(SPARE_LIGHTS)), 0]
+        return drawn[:, at]
 
     def _objects(self, geom: Int[Array, "W N"], slots: Slots) -> Int[Array, "W N"]:
         """Objects of the geoms that are seen."""

@@ -11,7 +11,8 @@ import numpy as np
 from ig2mj.process.opengl import use_opengl
 from ig2mj.sensors.images import NOTHING
 from ig2mj.sensors.particle_slots import Slots
-from ig2mj.sensors.render_model import BACKGROUND
+from ig2mj.sensors.render_model import BACKGROUND, SPARE_DIRECTIONS, SPARE_LIGHT
+from ig2mj.worlds.draw import SPARE_LIGHTS
 
 NEAR, FAR = 0.01, 100.0
 """m: planes of the view's frustum. MuJoCo's own near plane grows with the scene; a hand before the eye would be cut."""
@@ -62,11 +63,23 @@ class Canvas:
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         _close_at_exit(self)
 
-    def update(self, data: mujoco.MjData, camera: int, slots: Slots, world: int) -> None:
-        """Takes geoms, lights and a camera from `data`, and particles from the slots of a world."""
+    def update(
+        self,
+        data: mujoco.MjData,
+        camera: int,
+        slots: Slots,
+        world: int,
+        lights: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> None:
+        """Takes geoms, lights and a camera from `data`, and particles from the slots of a world.
+
+        `lights`: colours and turns of the world's lights (`ig2mj.worlds.draw.Draw`); None: as the model has them.
+        """
         self._camera.fixedcamid = camera
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(self._model, data, self._option, None, self._camera, everything, self._scene)
+        if lights is not None:
+            self._vary(*lights)
         slope = np.tan(np.deg2rad(float(self._model.cam_fovy[camera])) / 2)
         for eye in self._scene.camera:
             eye.frustum_near, eye.frustum_far = NEAR, FAR
@@ -74,6 +87,27 @@ class Canvas:
             eye.frustum_center = eye.frustum_width = 0  # as wide as height and aspect tell
         for slot in np.flatnonzero(slots.kind[world] >= 0):
             self._add(slots, world, int(slot))
+
+    def _vary(self, colour: np.ndarray, quat: np.ndarray) -> None:
+        """Colours and turns the scene's lights, and adds the spare ones that are on."""
+        scene = self._scene
+        own = [light for light in scene.lights[: scene.nlight] if not light.headlight]
+        for light in scene.lights[: scene.nlight]:
+            at = 0 if light.headlight else 1 + min(light.id if light.id >= 0 else 0, len(own) - 1)
+            if not light.headlight:
+                light.dir = _turned(quat[min(at, len(colour) - SPARE_LIGHTS - 1)], light.dir)
+            for name in ("ambient", "diffuse", "specular"):
+                setattr(light, name, getattr(light, name) * colour[min(at, len(colour) - SPARE_LIGHTS - 1)])
+        for k, direction in enumerate(SPARE_DIRECTIONS):
+            at = len(colour) - SPARE_LIGHTS + k
+            if not colour[at].any():
+                continue
+            scene.nlight += 1
+            light = scene.lights[scene.nlight - 1]
+            light.headlight, light.castshadow, light.type = 0, 0, int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+            light.dir, light.pos = _turned(quat[at], np.array(direction)), np.zeros(3)
+            light.ambient, light.specular = np.zeros(3), 0.1 * colour[at]
+            light.diffuse, light.attenuation = np.array(SPARE_LIGHT) * colour[at], np.array([1.0, 0.0, 0.0])
 
     def _add(self, slots: Slots, world: int, slot: int) -> None:
         scene = self._scene
@@ -131,6 +165,12 @@ class Canvas:
             self._context.free()
             self._gl.free()
             self._gl = None
+
+
+def _turned(quat: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    found = np.zeros(3)
+    mujoco.mju_rotVecQuat(found, np.asarray(direction, np.float64), quat.astype(np.float64))
+    return found
 
 
 def _upright(image: np.ndarray | None) -> np.ndarray | None:

@@ -17,6 +17,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.sensors.particle_slots import Slots
 from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.draw import Draw
 
 NOTHING = -1
 """In a segmentation: no object there (sky, agents, the world's own geoms). In `geom`: nothing was hit."""
@@ -76,9 +77,10 @@ class Camera(Protocol):
         states: ExtendedStates,
         eyes: Mapping[str, Pose] | None = None,
         rendered: Bool[Array, "W"] | None = None,
+        draw: Draw | None = None,
     ) -> Images:
         """Images of the present state of every world. `rendered`: the worlds that matter; those of the others cost next
-        to nothing, and mean nothing. None: all."""
+        to nothing, and mean nothing. None: all. `draw`: lights and fields of view of the worlds, where they differ."""
         ...
 
 

@@ -10,7 +10,7 @@ Axes: W worlds, C cameras, Y rows, X columns, S slots, N rays of a pattern, O ob
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -32,6 +32,7 @@ from ig2mj.sensors.render_model import mean_colours
 from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.draw import Draw
 
 
 class NativeCamera:
@@ -54,6 +55,7 @@ class NativeCamera:
         rays: Sequence[RayPattern] = (),
         rows: tuple[int, int] | None = None,
         looks: str = PLAIN,
+        varied: Collection[str] = (),
     ):
         """See `BatchCamera`. OpenGL is started by the first image; rays need none.
 
@@ -77,6 +79,7 @@ class NativeCamera:
         self._owner = np.concatenate([self._visual.owner, np.full(particles, NOTHING)]).astype(np.int32)
         self._plain = mean_colours(self._drawn, np.arange(self._drawn.ngeom))
         self._material, self._group = self._drawn.geom_matid.copy(), self._drawn.geom_group.copy()
+        self._fovy = self._drawn.cam_fovy.copy()
         self._canvas: Canvas | None = None
         self._look = engine.compile(self._look_fn)
 
@@ -87,8 +90,10 @@ class NativeCamera:
         states: ExtendedStates,
         eyes: Mapping[str, Pose] | None = None,
         rendered: Bool[Array, "W"] | None = None,
+        draw: Draw | None = None,
     ) -> Images:
         """Images of the present state of every world; see `BatchCamera`."""
+        drawn = jax.tree.map(np.asarray, draw or Draw())
         eyes = {name: (np.asarray(pos), np.asarray(quat)) for name, (pos, quat) in (eyes or {}).items()}
         count, (rgb, depth, segmentation) = self.engine.num_worlds, self._wants
         shape = (count, len(self.cameras), self.height, self.width)
@@ -103,7 +108,7 @@ class NativeCamera:
             live, data = self.engine.to_mujoco(physics, w)
             data = self._visual.data(live, data)
             self._take_colours(live)
-            self._drawn.geom_matid[:] = self._material
+            self._take_materials(live)
             for pattern in self._patterns:
                 pos, quat = eyes[pattern.name]
                 rays[pattern.name][w] = self._cast(data, pattern, pos[w], quat[w])
@@ -112,7 +117,12 @@ class NativeCamera:
             self._tint(tint[w])
             for c, (name, number) in enumerate(self.cameras.items()):
                 pose = tuple(part[w] for part in eyes[name]) if name in eyes else None
-                one = self._draw(data, number, pose, slots, w)
+                lights = None if drawn.light_colour is None else (drawn.light_colour[w], drawn.light_quat[w])
+                if drawn.camera_slope is not None:
+                    slope = np.tan(np.deg2rad(self._fovy[number]) / 2) * drawn.camera_slope[w]
+                    self._drawn.cam_fovy[number] = np.rad2deg(2 * np.arctan(slope))
+                one = self._draw(data, number, pose, slots, w, lights)
+                self._drawn.cam_fovy[number] = self._fovy[number]
                 for images, image in zip((colour, far, geom), one, strict=True):
                     if images is not None and image is not None:
                         images[w, c, self._rows] = image[self._rows]
@@ -153,6 +163,13 @@ class NativeCamera:
                 colours[changed] = own[changed]
             colours[:, 3] = colours[:, 3] > 0  # glass is opaque, as to the ray caster; OpenGL gives it no depth
 
+    def _take_materials(self, live: mujoco.MjModel) -> None:
+        """Gives geoms the materials of a world's model where they differ from the scene's."""
+        usual = self.engine.scene.model.geom_matid
+        self._drawn.geom_matid[:] = self._material
+        changed = np.flatnonzero(live.geom_matid != usual)
+        self._drawn.geom_matid[changed] = live.geom_matid[changed]
+
     def _tint(self, tint: Int[np.ndarray, "O"]) -> None:
         """Gives geoms of objects whose state shows their mean colours, tinted, in place of texture and material."""
         if (tint == UNTINTED).all():
@@ -164,7 +181,13 @@ class NativeCamera:
         self._drawn.geom_matid[geoms] = -1
 
     def _draw(
-        self, data: mujoco.MjData, camera: int, pose: tuple[np.ndarray, ...] | None, slots: Slots, world: int
+        self,
+        data: mujoco.MjData,
+        camera: int,
+        pose: tuple[np.ndarray, ...] | None,
+        slots: Slots,
+        world: int,
+        lights: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
         if self._canvas is None:
             self._canvas = Canvas(self._drawn, self.width, self.height, self._visible, self.slots, self._shadows)
@@ -173,7 +196,7 @@ class NativeCamera:
             if pose is not None:
                 data.cam_xpos[camera], data.cam_xmat[camera] = pose[0], _matrix(pose[1]).ravel()
             self._drawn.geom_group[:] = np.where(self._in_view(data, camera), self._group, HIDDEN_GROUP)
-            self._canvas.update(data, camera, slots, world)
+            self._canvas.update(data, camera, slots, world, lights)
         finally:
             data.cam_xpos[camera], data.cam_xmat[camera] = keep
             self._drawn.geom_group[:] = self._group

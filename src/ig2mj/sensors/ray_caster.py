@@ -32,11 +32,18 @@ CONSTRUCTOR, LEAF = "sah", 2
 """How trees of merged meshes are built; they are built once."""
 
 
-def use_merged(contexts: Sequence[Any], host: mujoco.MjModel, tables: Tables, nworld: int) -> None:
+def use_merged(
+    contexts: Sequence[Any],
+    host: mujoco.MjModel,
+    tables: Tables,
+    nworld: int,
+    changes: Sequence[tuple[str, str]] = (),
+) -> None:
     """Lets render contexts cast rays against merged meshes.
 
     Args:
       contexts: of MuJoCo Warp, of cameras of the render model, made with `tables.absorbed` in no group that is seen.
+      changes: of the kernel (`limit_light`).
     """
     assert host.nflex == 0, "flexes' arrays carry the tables"
 
@@ -70,7 +77,7 @@ def use_merged(contexts: Sequence[Any], host: mujoco.MjModel, tables: Tables, nw
             context.flex_geom_edgeid = wp.array(rows.astype(np.int32), dtype=int)
             context.geom_ray_types = tuple(sorted({*context.geom_ray_types, MESH}))
             bvh.build_scene_bvh(as_merged, data, context, nworld)
-            limit_light(context, host.nlight, make_cast_ray)
+            limit_light(context, host.nlight, make_cast_ray, changes)
 
 
 @no_type_check

@@ -15,6 +15,7 @@ from jaxtyping import Float, Int
 from ig2mj.errors import EngineError
 from ig2mj.looks.visual import decorate
 from ig2mj.scene.scene import PLAIN, Scene
+from ig2mj.worlds.draw import SPARE_LIGHTS
 
 BACKGROUND = (0.86, 0.90, 0.94, 1.0)
 """rgba where nothing is hit."""
@@ -23,11 +24,23 @@ NOWHERE = (0.0, 0.0, -50.0)
 """Metres, world frame: where slots are that show nothing."""
 
 
-def make_render_model(scene: Scene, slots: int, cameras: Sequence[str] = (), looks: str = PLAIN) -> mujoco.MjModel:
+SPARE_LIGHT = (0.4, 0.4, 0.38)
+"""rgb of a light that is on only in some worlds."""
+
+SPARE_DIRECTIONS = ((0.55, 0.3, -0.78), (-0.5, -0.35, -0.79))
+"""Unit, world frame: of those lights."""
+
+assert len(SPARE_DIRECTIONS) == SPARE_LIGHTS
+
+
+def make_render_model(
+    scene: Scene, slots: int, cameras: Sequence[str] = (), looks: str = PLAIN, lights: bool = False
+) -> mujoco.MjModel:
     """Compiles the render model; behind the scene's geoms come those of its looks (`ig2mj.looks`), then the slots.
 
     Args:
       cameras: names of cameras that are added behind the scene's own, for poses that are given with each image.
+      lights: behind all others come `SPARE_LIGHTS`, and one more whose colour is that of the light at the camera.
 
     Raises:
       EngineError: the scene on disk is no longer the one that was loaded.
@@ -52,6 +65,15 @@ def make_render_model(scene: Scene, slots: int, cameras: Sequence[str] = (), loo
         )
     for name in cameras:
         body.add_camera(name=name)
+    for direction in (*SPARE_DIRECTIONS, (0.0, 0.0, -1.0)) if lights else ():
+        spec.worldbody.add_light(
+            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+            dir=list(direction),
+            diffuse=list(SPARE_LIGHT),
+            specular=[0.1] * 3,
+            ambient=[0.0] * 3,
+            castshadow=False,
+        )
     model = spec.compile()
     known = scene.model
     if model.ngeom < known.ngeom + slots or (model.geom_bodyid[: known.ngeom] != known.geom_bodyid).any():

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import inspect
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import warp as wp
@@ -38,17 +38,43 @@ SHINE = (
 )
 """Parts of its lines, and what stands in their place: highlights are not limited by a texture."""
 
+_HEAD = "light_diffuse[worldid % light_diffuse.shape[0], wp.static(M_NLIGHT - 1)]"
 
-def limit_light(context: Any, lights: int, make_cast_ray: Callable[..., wp.Function] = render._make_cast_ray) -> None:
+LIGHTS_PER_WORLD = tuple(
+    (f'wp.static(rc_static["{name}"])' + end, f'wp.cw_mul(wp.static(rc_static["{name}"]), {_HEAD})' + end)
+    for name, end in (("headlight_ambient", ")\n"), ("headlight_diffuse", ",\n"), ("headlight_specular", ",\n"))
+)
+"""The light at the camera in each world's colour, which is that of the last light; that one must be inactive."""
+
+FOV_PER_WORLD = (
+    (
+        "      ray_dir_local_cam = ray[ray_base + rayid]\n",
+        "      wide = cam_fovy[worldid % cam_fovy.shape[0], mujoco_cam_id]\n"
+        "      ray_dir_local_cam = ray[ray_base + rayid]\n"
+        "      ray_dir_local_cam = wp.normalize(\n"
+        "        wp.vec3(wide * ray_dir_local_cam[0], wide * ray_dir_local_cam[1], ray_dir_local_cam[2])\n"
+        "      )\n",
+    ),
+)
+"""Rays spread by each world's factor, which takes the place of the field of view in the model's fields."""
+
+
+def limit_light(
+    context: Any,
+    lights: int,
+    make_cast_ray: Callable[..., wp.Function] = render._make_cast_ray,
+    changes: Sequence[tuple[str, str]] = (),
+) -> None:
     """Lets a render context of MuJoCo Warp shade as OpenGL does, once all else in it is as it stays.
 
     Args:
       lights: of the render model.
       make_cast_ray: makes the function that finds what a ray hits, from what upstream's takes; left out, upstream's.
+      changes: further parts of the kernel's text, and what stands in their place.
     """
     build = render._build_megakernel
     text = inspect.getsource(build)
-    for old, new in (*((line, line + more) for line, more in LIGHT), *SHINE):
+    for old, new in (*((line, line + more) for line, more in LIGHT), *SHINE, *changes):
         assert text.count(old) == 1, f"MuJoCo Warp's kernel has changed: {old}"
         text = text.replace(old, new)
     own = defined(build.__name__, text, {**build.__globals__, "_make_cast_ray": make_cast_ray})

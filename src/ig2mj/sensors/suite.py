@@ -12,7 +12,7 @@ Axes: W worlds.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import jax.numpy as jnp
@@ -23,6 +23,7 @@ from ig2mj.agents.base import Controller
 from ig2mj.engine.base import Engine, Physics
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, PluginError
+from ig2mj.geometry.poses import compose
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors.base import Memory, Percept, Sensor, SensorOptions, Setup, Space
@@ -30,6 +31,7 @@ from ig2mj.sensors.images import Camera, Images, Pose
 from ig2mj.sensors.registry import find_sensor
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.draw import Draw
 
 Readings = dict[str, Array]
 
@@ -57,6 +59,7 @@ class SensorSuite:
         names: str | Sequence[str],
         options: SensorOptions | None = None,
         agent: int = 0,
+        varied: Collection[str] = (),
     ):
         """Makes the camera that the sensors need.
 
@@ -64,6 +67,7 @@ class SensorSuite:
           engine: whose worlds are perceived. scene: theirs. model: constants of the states.
           controller: of the agent, which is number `agent` of the scene.
           names: of sensors (`ig2mj.sensors.registry.SENSORS`), or a single one.
+          varied: axes of `ig2mj.Randomize` that are on; readings then take what was drawn.
 
         Raises:
           UnknownNameError: no such sensor. EngineError: the robot lacks what a sensor needs, or the engine cannot make
@@ -73,6 +77,7 @@ class SensorSuite:
         self.options = options or SensorOptions()
         self._setup = Setup(scene, model, controller, self.options, agent)
         self.spaces: dict[str, Space] = {s.name: s.space(self._setup) for s in self._sensors}
+        self._varied = frozenset(varied) & {"lights", "camera"}
         self._felt = [s for s in self._sensors if not s.looks]
         self._seen = [s for s in self._sensors if s.looks]
         self._patterns = {}
@@ -106,6 +111,8 @@ class SensorSuite:
             raise EngineError(
                 f"the {engine.name} engine neither renders images nor casts rays (take 'native' or 'warp')"
             )
+        if self._varied:
+            settings["varied"] = self._varied
         module, kind = CAMERAS[engine.renderer].split(":")
         return getattr(importlib.import_module(module), kind)(engine, self._setup.model, cameras, **settings)
 
@@ -134,6 +141,7 @@ class SensorSuite:
         controller: Any,
         memory: Memory | None = None,
         keys: UInt32[Array, "W 2"] | None = None,
+        draw: Draw | None = None,
     ) -> tuple[Readings, Memory | None]:
         """Readings of all sensors, compiled where that helps.
 
@@ -141,11 +149,12 @@ class SensorSuite:
           controller: what the agent's controller remembers.
           memory: as returned by the last call; None at the first reading of all worlds.
           keys: of the noise of this reading, of each world; only needed where there is noise.
+          draw: of the worlds' episodes, where something is drawn for them.
 
         Returns:
           Readings by name, [W, ...] each; and what the next reading needs to know of this one.
         """
-        return self._whole(physics, view, states, controller, memory, keys)
+        return self._whole(physics, view, states, controller, memory, keys, draw)
 
     def read_fn(
         self,
@@ -155,9 +164,10 @@ class SensorSuite:
         controller: Any,
         memory: Memory | None = None,
         keys: UInt32[Array, "W 2"] | None = None,
+        draw: Draw | None = None,
     ) -> tuple[Readings, Memory | None]:
         """`read`, not compiled."""
-        seen, memory = self.look_fn(physics, view, states, controller, memory, keys)
+        seen, memory = self.look_fn(physics, view, states, controller, memory, keys, draw=draw)
         felt = self._feel(view, states, controller) if self._felt else {}
         return {name: {**felt, **seen}[name] for name in self.spaces}, memory
 
@@ -175,6 +185,7 @@ class SensorSuite:
         memory: Memory | None = None,
         keys: UInt32[Array, "W 2"] | None = None,
         rendered: Bool[Array, "W"] | None = None,
+        draw: Draw | None = None,
     ) -> tuple[Readings, Memory | None]:
         """Readings of the sensors that need images or rays; see `read`.
 
@@ -183,8 +194,9 @@ class SensorSuite:
         """
         if self._camera is None:
             return {}, None
-        eye, poses = self._poses(view, controller)
-        images = self._camera(physics, view, states, poses, rendered)
+        draw = draw if draw is not None and self._varied else Draw()
+        eye, poses = self._poses(view, controller, draw)
+        images = self._camera(physics, view, states, poses, rendered, draw)
         return self._finish(view, states, controller, eye, images, memory, keys)
 
     # Memory.
@@ -197,12 +209,14 @@ class SensorSuite:
         pos, quat = self._setup.controller.eye(view, controller)
         return Memory(pos, quat, jnp.asarray(view.body_pos), jnp.asarray(view.body_quat))
 
-    def _poses_fn(self, view: PhysicsView, controller: Any) -> tuple[Pose | None, dict[str, Pose]]:
+    def _poses_fn(self, view: PhysicsView, controller: Any, draw: Draw) -> tuple[Pose | None, dict[str, Pose]]:
         """Of the eye, and of everything that the camera is to be called with."""
         eye, poses = None, {}
         if self._setup.scene.manifest.agents[self._setup.agent].camera:
             pos, quat = self._setup.controller.eye(view, controller)
             eye = (jnp.asarray(pos), jnp.asarray(quat))
+            if draw.camera_pos is not None and draw.camera_quat is not None:
+                eye = compose(*eye, jnp.asarray(draw.camera_pos), jnp.asarray(draw.camera_quat))
             if any(s.images for s in self._seen):
                 poses[self._setup.camera] = eye
         for name, (_, pose) in self._patterns.items():

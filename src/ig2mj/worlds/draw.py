@@ -4,7 +4,8 @@ Physics, materials and lights of an episode are fields of the world's model (`ig
 coordinates; snapshots have both. All else that `Randomize` draws is here. A batch keeps it, so that files of states and
 recordings have it, too.
 
-Axes: W worlds, R roles (objects of a task whose models vary).
+Axes: W worlds, R roles (objects of a task whose models vary), N lights: that at the camera, the home's own, and
+`SPARE_LIGHTS` more.
 """
 
 from __future__ import annotations
@@ -13,6 +14,9 @@ from flax import struct
 from jaxtyping import Float, Int
 
 from ig2mj.engine.view import Array
+
+SPARE_LIGHTS = 2
+"""Lights that are off but for worlds whose number of lights differs."""
 
 
 @struct.dataclass
@@ -26,6 +30,7 @@ class Draw:
       camera_pos, camera_quat: by which the robot's cameras are displaced, m and w-x-y-z, in each camera's own frame
         (x right, y up, -z forward).
       camera_slope: factor of the tangent of half the vertical field of view.
+      light_colour: factors of each light's red, green and blue; 0: it is off. light_quat: by which it is turned.
       noise: 0..1, strength of the noise of the episode's observations.
       instruction: number of the wording; takes the remainder by the number of wordings.
     """
@@ -36,5 +41,7 @@ class Draw:
     camera_pos: Float[Array, "W 3"] | None = None
     camera_quat: Float[Array, "W 4"] | None = None
     camera_slope: Float[Array, "W"] | None = None
+    light_colour: Float[Array, "W N 3"] | None = None
+    light_quat: Float[Array, "W N 4"] | None = None
     noise: Float[Array, "W"] | None = None
     instruction: Int[Array, "W"] | None = None

@@ -10,6 +10,7 @@ Axes: W worlds, V variants, O objects, B bodies, G geoms, M materials, L lights,
 from __future__ import annotations
 
 import math
+import re
 import zlib
 
 import jax
@@ -21,8 +22,8 @@ from jaxtyping import Float, UInt
 from ig2mj.engine.model_fields import MASSES, ModelFields, with_masses
 from ig2mj.engine.view import Array
 from ig2mj.scene.tables import SceneTables
-from ig2mj.worlds.draw import Draw
-from ig2mj.worlds.randomize import Range, Randomize
+from ig2mj.worlds.draw import SPARE_LIGHTS, Draw
+from ig2mj.worlds.randomize import Randomize, Range
 
 VARIANTS = 64
 """Sets of masses that are made when an environment is: what MuJoCo derives from masses is computed on the host. Each
@@ -43,19 +44,29 @@ class Randomization:
         self.physics = randomize.settings("physics")
         self.noise, self.instructions = randomize.settings("sensor_noise"), randomize.settings("instructions")
         self._objects = len(tables.object_names)
+        self.materials, self.lights = randomize.settings("materials"), randomize.settings("lights")
+        self.camera, self._lights = randomize.settings("camera"), model.nlight
         if self.physics is not None:
             self._plan_physics(model, tables)
+        if self.materials is not None:
+            self._plan_materials(model, tables)
 
     def fields(self, key: UInt[Array, "W 2"]) -> ModelFields:
         """Of worlds whose episodes have these keys."""
         found = {}
         if self.physics is not None:
             found |= self._physics_fields(key)
+        if self.materials is not None:
+            found |= self._material_fields(key)
         return ModelFields(**found)
 
     def draw(self, key: UInt[Array, "W 2"]) -> Draw:
         """All else, of worlds whose episodes have these keys."""
         found = {}
+        if self.lights is not None:
+            found |= self._light_draw(key)
+        if self.camera is not None:
+            found |= self._camera_draw(key)
         if self.noise is not None:
             found["noise"] = uniform(key, "noise")
         if self.instructions is not None:
@@ -88,6 +99,92 @@ class Randomization:
         """A factor for each entry of a field: its object's; 1 where `owner` is -1."""
         of_object = factors(key, name, between, (self._objects,))
         return jnp.where(owner >= 0, of_object[:, np.maximum(owner, 0)], 1.0).astype(jnp.float32)
+
+    # Materials.
+
+    def _plan_materials(self, model: mujoco.MjModel, tables: SceneTables) -> None:
+        whole = _wholes(tables)
+        self._look_object = whole[tables.geom_object]
+        self._rgba, self._mat_rgba = np.array(model.geom_rgba, np.float32), np.array(model.mat_rgba, np.float32)
+        self._material = np.array(model.geom_matid, np.int32)
+        self._of_home = np.isin(np.arange(model.nmat), self._material[self._look_object >= 0])
+        kinds = [kind_of_material(model.material(m).name) for m in range(model.nmat)]
+        self._kinds = [np.flatnonzero([kind == one for kind in kinds]) for one in dict.fromkeys(filter(None, kinds))]
+
+    def _material_fields(self, key: UInt[Array, "W 2"]) -> dict[str, Array]:
+        objects, of_object = self._objects, self._look_object
+        colour = factors(key, "object_colour", self.materials.colour, (objects + 1, 3))
+        own = jnp.where((of_object >= 0)[:, None], colour[:, of_object], 1.0)
+        own = jnp.concatenate([own, jnp.ones_like(own[..., :1])], axis=-1)
+        plain = (self._rgba == UNCOLOURED).all(1)  # what a material colours
+        rgba = jnp.where(plain[:, None], self._rgba, jnp.clip(self._rgba * own, 0.0, 1.0))
+        shade = factors(key, "material_colour", self.materials.colour, (len(self._mat_rgba), 3))
+        shade = jnp.where(self._of_home[:, None], shade, 1.0)
+        shade = jnp.concatenate([shade, jnp.ones_like(shade[..., :1])], axis=-1)
+        exchanged = uniform(key, "exchanged", (objects + 1,)) < self.materials.textures
+        share, material = uniform(key, "material", (objects + 1,)), jnp.asarray(self._material)
+        found = jnp.broadcast_to(material, (key.shape[0], len(self._material)))
+        for kind in self._kinds:
+            number = jnp.minimum((share * len(kind)).astype(jnp.int32), len(kind) - 1)
+            other = jnp.asarray(kind, jnp.int32)[number][:, of_object]
+            replaced = exchanged[:, of_object] & np.isin(self._material, kind) & (of_object >= 0)
+            found = jnp.where(replaced, other, found)
+        mat_rgba = jnp.clip(self._mat_rgba * shade, 0.0, 1.0)
+        return {"geom_rgba": rgba, "mat_rgba": mat_rgba, "geom_matid": found.astype(jnp.int32)}
+
+    # Light and cameras.
+
+    def _light_draw(self, key: UInt[Array, "W 2"]) -> dict[str, Array]:
+        own, count = self._lights, 1 + self._lights + SPARE_LIGHTS
+        brightness = factors(key, "light_intensity", self.lights.intensity, (count, 1))
+        colour = brightness * factors(key, "light_colour", self.lights.colour, (count, 3))
+        chance = uniform(key, "light_on", (count,))
+        on = jnp.concatenate(
+            [
+                jnp.ones_like(chance[:, :1], bool),
+                chance[:, 1 : 1 + own] >= self.lights.off,
+                chance[:, 1 + own :] < self.lights.spare,
+            ],
+            axis=1,
+        )
+        if own:
+            on = on.at[:, 1].set(on[:, 1] | ~on[:, 1:].any(1))
+        angle = jnp.deg2rad(self.lights.direction) * uniform(key, "light_direction", (count, 2), -1.0, 1.0)
+        axis = jnp.concatenate([angle, jnp.zeros_like(angle[..., :1])], axis=-1)
+        return {"light_colour": jnp.where(on[..., None], colour, 0.0), "light_quat": quat_of(axis)}
+
+    def _camera_draw(self, key: UInt[Array, "W 2"]) -> dict[str, Array]:
+        turn = jnp.deg2rad(self.camera.turn) * uniform(key, "camera_turn", (3,), -1.0, 1.0)
+        return {
+            "camera_pos": self.camera.shift * uniform(key, "camera_shift", (3,), -1.0, 1.0) / math.sqrt(3.0),
+            "camera_quat": quat_of(turn),
+            "camera_slope": factors(key, "camera_slope", self.camera.fovy, ()),
+        }
+
+
+KINDS = {
+    "wood": ("wood",),
+    "cloth": ("fabric", "knit", "canvas", "pile", "checks", "leather", "tissue", "towel", "carpet"),
+    "metal": ("metal", "steel", "chrome"),
+    "cover": ("cover",),
+    "stone": ("stone", "marble", "granite", "tile", "tiles", "concrete"),
+}
+"""Kinds of materials within which objects exchange them, and how names of such materials begin."""
+
+UNCOLOURED = np.array([0.5, 0.5, 0.5, 1.0], np.float32)
+"""MuJoCo's colour of geoms that have the one of their material."""
+
+
+def kind_of_material(name: str) -> str | None:
+    """By the beginning of its name, behind those of folders; None: it is made for one object."""
+    first = re.split(r"[_\-.\d]", name.rpartition("/")[2].lower(), maxsplit=1)[0]
+    return next((kind for kind, words in KINDS.items() if first in words), None)
+
+
+def quat_of(turn: Float[Array, "... 3"]) -> Float[Array, "... 4"]:
+    """w-x-y-z of rotation vectors (rad)."""
+    half = 0.5 * jnp.linalg.norm(turn, axis=-1, keepdims=True)
+    return jnp.concatenate([jnp.cos(half), 0.5 * turn * jnp.sinc(half / jnp.pi)], axis=-1)
 
 
 def stream(key: UInt[Array, "W 2"], name: str) -> UInt[Array, "W 2"]:

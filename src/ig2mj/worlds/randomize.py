@@ -73,7 +73,7 @@ class Materials(_Axis):
     """
 
     model_fields: ClassVar[tuple[str, ...]] = ("geom_rgba", "mat_rgba", "geom_matid")
-    colour: Range = (0.6, 1.3)
+    colour: Range = (0.7, 1.25)
     textures: float = 0.7
 
 
@@ -83,14 +83,15 @@ class Lights(_Axis):
 
     Attributes:
       intensity: factors of each light's brightness. colour: factors of red, green and blue.
-      direction: degrees, largest turn of a light. off: probability that a light is off; one always stays on.
+      direction: degrees, largest turn of a light.
+      off: probability that a light of the home is off; one stays on. spare: that each of two more lights is on.
     """
 
-    model_fields: ClassVar[tuple[str, ...]] = ("light_dir", "light_diffuse", "light_ambient", "light_specular")
     intensity: Range = (0.6, 1.5)
     colour: Range = (0.85, 1.18)
     direction: float = 25.0
     off: float = 0.25
+    spare: float = 0.3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,7 +168,7 @@ AXES: dict[str, type[_Axis]] = {
 }
 """Settings of each axis, in the order of `Randomize`."""
 
-UNFINISHED: frozenset[str] = frozenset({"objects", "object_poses", "materials", "lights", "camera", "robot_start"})
+UNFINISHED: frozenset[str] = frozenset({"objects", "object_poses", "robot_start"})
 """Axes that environments refuse."""
 
 
@@ -272,7 +273,7 @@ def _range(name: str, given: Any) -> Range:
     return low, high
 
 
-_PROBABILITIES = ("off", "textures")
+_PROBABILITIES = ("off", "spare", "textures")
 
 
 def _number(field: dataclasses.Field[Any], given: Any) -> float | int:

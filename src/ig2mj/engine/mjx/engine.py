@@ -198,7 +198,9 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
         qpos, qvel, woken = apply_write(self.layout, self.host_model, data.qpos, data.qvel, write)
         eq_active, ignored = after_release(self.layout, write, data.eq_active, physics.ignored)
         check_written(write.model_fields, self.model_fields, self.host_model, self.num_worlds)
-        fields = jax.tree.map(lambda a: jnp.asarray(a, jnp.float32), merged(physics.fields, write.model_fields))
+        fields = jax.tree.map(
+            lambda a, old: jnp.asarray(a, old.dtype), merged(physics.fields, write.model_fields), physics.fields
+        )
         eq_data, written = given(fields)["eq_data"], given(write.model_fields)
         woken |= trees_joined(self.layout, (data.eq_active, old["eq_data"]), (eq_active, eq_data))
         for name, array in written.items():
