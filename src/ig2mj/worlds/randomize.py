@@ -32,7 +32,7 @@ class _Axis:
 
     def __post_init__(self) -> None:
         """Raises EngineError: a setting is none."""
-        for field in dataclasses.fields(self):  # pyright: ignore[reportArgumentType]
+        for field in dataclasses.fields(self):  # pyright: ignore
             value = getattr(self, field.name)
             if isinstance(field.default, tuple):
                 object.__setattr__(self, field.name, _range(field.name, value))
@@ -226,7 +226,8 @@ class Randomize:
     @classmethod
     def every(cls) -> Randomize:
         """All axes with their usual settings."""
-        return cls(**{name: kind() for name, kind in AXES.items()})
+        usual: dict[str, Any] = {name: kind() for name, kind in AXES.items()}
+        return cls(**usual)
 
     def settings(self, axis: str) -> Any:
         """Settings of an axis; None: it is off. Raises EngineError, UnknownNameError: they are none."""
