@@ -405,7 +405,7 @@ class BatchCamera:
         found = {}
         if self._lit:
             colour = jnp.ones((self.engine.num_worlds, 1, 3)) if draw.light_colour is None else draw.light_colour
-            of_lights = self._of_lights(colour)
+            of_lights = jnp.asarray(self._of_lights(colour))
             if draw.light_colour is None:  # no spare ones
                 of_lights = of_lights.at[:, -1 - SPARE_LIGHTS : -1].set(0.0)
             own, last = of_lights[:, :-1], of_lights[:, -1:]
