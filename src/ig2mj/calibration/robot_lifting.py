@@ -46,6 +46,9 @@ POST = 0.06
 SPREAD, TURN = 0.012, math.radians(12)
 """m and rad: by which the cube's position and angle differ between tries."""
 
+ON_POST = 0.25
+"""Share of the edge of a post as narrow as the cube, by which the cube may be off its middle: it falls at a half."""
+
 HOVER = 0.10
 """m between the gripper and the cube before it approaches."""
 
@@ -112,7 +115,8 @@ def lift(
         if found is None:
             continue
         height = round(float(point[2]) - edge / 2, 3)
-        cube, post = prop(edge, edge), prop(POST if name == "from above" else edge, height)
+        width = POST if name == "from above" else edge
+        cube, post = prop(edge, edge), prop(width, height)
         objects = [f"{post}@fixed:{point[0]:.4f},{point[1]:.4f},{height / 2:.4f},0", str(cube)]
         scene = load_scene(home, agents=[robot], objects=objects)
         if not _stands_in_furniture(scene) and not _in_the_way(Arm(scene, robot, hand), *found):
@@ -129,9 +133,10 @@ def lift(
     arm = Arm(scene, ready, hand)
     side = arm.put(q)[2].copy()
     yaw = math.atan2(side[1], side[0])
+    spread = min(SPREAD, ON_POST * width)
     for _ in range(tries):
         simulation.reset()
-        shift = np.array([*rng.uniform(-SPREAD, SPREAD, 2), 0.0])
+        shift = np.array([*rng.uniform(-spread, spread, 2), 0.0])
         turn = yaw + rng.uniform(-TURN, TURN)
         spot = point + shift
         simulation.set_object_pose(loose, spot, (math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2)))
