@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 import warp as wp
+from constraint_rows import Rows, assert_same_rows
 from kernel_loading import load_kernels_of
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.third_party.mujoco_warp._src.types import OverflowType
@@ -91,7 +92,8 @@ def test_iterations_accelerations_and_forces_are_upstreams(kernel_device, monkey
         mine, theirs = pair.of("solver_niter")
         assert np.array_equal(mine, theirs), step
         assert np.array_equal(*pair.of("overflow"))
-        assert np.array_equal(pair.own.efc.state.numpy(), pair.upstream.efc.state.numpy())
+        for world in range(len(PUSHES)):
+            assert_same_rows(Rows.of(pair.own, world), Rows.of(pair.upstream, world), forces=1e-4)
         most = np.maximum(most, mine)
     assert most[0] == 1 and (most[1:] >= 4).all(), "of worlds that need one and several iterations"
 
