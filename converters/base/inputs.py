@@ -95,6 +95,17 @@ def folders_in(path: Path) -> list[str]:
     return _ask("listing", path).split("/")[:-1]
 
 
+def files_in(path: Path) -> list[str]:
+    """Names of the files in a folder, sorted; [] where it is none."""
+    return _ask("files", path).split("/")[:-1]
+
+
+def namesakes(path: Path) -> list[pathlib.Path]:
+    """Files next to where `path` would be whose names differ from its name in case only, sorted."""
+    place = pathlib.Path(path)
+    return [place.with_name(name) for name in files_in(place.parent) if name.casefold() == place.name.casefold()]
+
+
 def real_path(path: Path) -> pathlib.Path:
     """As `pathlib.Path.resolve`; a symbolic link on the way is part of the record. Raises OSError, RuntimeError."""
     plain, real = pathlib.Path(path), pathlib.Path(path).resolve()
@@ -117,8 +128,9 @@ def _answer(kind: str, path: Path) -> str:
     try:
         if kind == "content":
             return hashlib.sha256(place.read_bytes()).hexdigest()
-        if kind == "listing":
-            names = sorted(f.name for f in place.iterdir() if f.is_dir() and not f.name.startswith("."))
+        if kind in ("listing", "files"):
+            wanted = pathlib.Path.is_dir if kind == "listing" else pathlib.Path.is_file
+            names = sorted(f.name for f in place.iterdir() if wanted(f) and not f.name.startswith("."))
             return "".join(f"{name}/" for name in names)
         if kind == "link":
             return str(place.resolve())

@@ -13,6 +13,11 @@ _MARKS = (
 )
 
 
+LFS_POINTER = b"version https://git-lfs"
+"""How the file begins that a checkout without Git LFS has instead of a large one."""
+LFS_FIX = "it is a Git LFS pointer: run git lfs pull"
+
+
 def marked_encoding(raw: bytes) -> tuple[str, int] | None:
     """(encoding, length of the mark) of bytes that begin with a byte-order mark, else None.
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .xml_reader import Element, numbers
+from ig2mj.errors import InputError
+
+from .xml_reader import Element, numbers, where
 
 ROTATION_TOLERANCE = 1e-9
 
@@ -25,12 +27,24 @@ def pose_from(xyz: np.ndarray, rpy: np.ndarray) -> np.ndarray:
 
 
 def read_origin(parent: Element, file: object) -> np.ndarray:
-    """4x4 of the child element <origin xyz rpy>; each of them may be missing (identity)."""
+    """4x4 of the child element <origin xyz rpy>, or <origin xyz quat_xyzw> of URDF 1.2; each may be missing (identity).
+
+    Raises:
+      InputError: both rpy and quat_xyzw, or a quaternion of length zero.
+    """
     origin = parent.find("origin")
     if origin is None:
         return np.eye(4)
     zero = (0.0, 0.0, 0.0)
-    return pose_from(numbers(origin, "xyz", 3, file, zero), numbers(origin, "rpy", 3, file, zero))
+    pose = pose_from(numbers(origin, "xyz", 3, file, zero), numbers(origin, "rpy", 3, file, zero))
+    if origin.get("quat_xyzw") is not None:
+        if origin.get("rpy") is not None:
+            raise InputError(file, "has both rpy and quat_xyzw", element=where(origin), fix="keep one of them")
+        quat = numbers(origin, "quat_xyzw", 4, file)
+        if np.linalg.norm(quat) < ROTATION_TOLERANCE:
+            raise InputError(file, "quat_xyzw has length zero", element=where(origin))
+        pose[:3, :3] = rotation_from_wxyz(wxyz(quat))
+    return pose
 
 
 def wxyz(xyzw: np.ndarray) -> np.ndarray:

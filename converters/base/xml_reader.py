@@ -22,7 +22,7 @@ from ig2mj.errors import InputError
 
 from . import inputs
 from .read_limits import check_limit
-from .text import marked_encoding
+from .text import LFS_FIX, LFS_POINTER, marked_encoding
 
 MAX_NUMBER = 1e15  # beyond, products of a few numbers are no numbers any more
 ENCODINGS = re.compile(
@@ -75,7 +75,8 @@ def decode_xml(raw: bytes, file: object) -> str:
     text = _decoded(raw)
     start = text.find("<")
     if start < 0:
-        raise InputError(file, "is not XML: it holds no '<'" if text.strip("\0 \r\n\t") else "is empty")
+        fix = LFS_FIX if raw.startswith(LFS_POINTER) else ""
+        raise InputError(file, "is not XML: it holds no '<'" if text.strip("\0 \r\n\t") else "is empty", fix=fix)
     if start:
         text = "\n" * text.count("\n", 0, start) + text[start:]
     text = _DECLARATION.sub(_only_newlines, text, count=1)

@@ -28,7 +28,8 @@ def implausible(model: ObjectModel, assembly: Assembly) -> list[str]:
         return ["has no collision geometry: nothing touches it" if visual is not None else "has no geometry at all"]
     if model.category in BUILDING:
         return []
-    return [*_odd_extents(model, collision), *_boxes_apart(collision, visual), *_odd_densities(assembly)]
+    odd = [*_odd_extents(model, collision), *_boxes_apart(collision, visual)]
+    return [*odd, *_odd_densities(assembly), *_far_centres(assembly)]
 
 
 def _odd_extents(model: ObjectModel, box: np.ndarray) -> list[str]:
@@ -68,6 +69,20 @@ def _odd_densities(assembly: Assembly) -> list[str]:
         f"link '{name}' weighs {mass:.3g} kg, {density:.3g} kg/m3 of its collision geometry"
         for _, name, mass, density in found[:3]
     ]
+
+
+def _far_centres(assembly: Assembly) -> list[str]:
+    """Of bodies whose centre of mass lies further outside the box of their collision geometry than it is large."""
+    found = []
+    for body in assembly.bodies:
+        if not body.collisions or body.inertial.mass <= MIN_MASS:
+            continue
+        points = np.concatenate([piece.vertices for piece in body.collisions])
+        low, high, centre = points.min(axis=0), points.max(axis=0), body.inertial.pose[:3, 3]
+        outside = float(np.linalg.norm(np.maximum(np.maximum(low - centre, centre - high), 0.0)))
+        if outside > np.linalg.norm(high - low) + SLACK:
+            found.append(f"link '{body.name}' has its centre of mass {outside:.3g} m outside of its collision geometry")
+    return found[:3]
 
 
 def _volume(body: BodyPlan) -> float:

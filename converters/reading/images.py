@@ -13,6 +13,7 @@ from PIL import Image, UnidentifiedImageError
 from ig2mj.errors import Ig2mjError
 
 from ..base.read_limits import limits
+from ..base.text import LFS_FIX, LFS_POINTER
 
 FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP")
 """Formats of textures and room maps: each is decoded inside this process."""
@@ -43,7 +44,8 @@ def open_image(raw: bytes) -> Iterator[Image.Image]:
     except (ImageError, Ig2mjError, MemoryError):
         raise
     except UnidentifiedImageError as e:
-        raise ImageError(f"is no image that is read ({', '.join(FORMATS)})") from e
+        why = LFS_FIX if raw.startswith(LFS_POINTER) else ", ".join(FORMATS)
+        raise ImageError(f"is no image that is read ({why})") from e
     except Exception as e:  # Pillow's decoders raise a dozen kinds of errors on broken files
         raise ImageError(f"is a broken image: {e}") from e
 

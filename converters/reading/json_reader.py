@@ -12,7 +12,7 @@ import numpy as np
 from ig2mj.errors import InputError
 
 from ..base.read_limits import check_limit
-from ..base.text import without_mark
+from ..base.text import LFS_FIX, LFS_POINTER, without_mark
 from ..base.xml_reader import MAX_NUMBER, read_bytes
 
 MAX_JSON_BYTES = 64 * 2**20
@@ -28,7 +28,8 @@ def decode_json(text: str | bytes, file: object, element: str = "") -> Any:
     except RecursionError as e:
         raise InputError(file, "is JSON that is nested too deeply", element=element) from e
     except ValueError as e:
-        raise InputError(file, f"is not valid JSON: {e}", element=element) from e
+        fix = LFS_FIX if raw.startswith(LFS_POINTER) else ""
+        raise InputError(file, f"is not valid JSON: {e}", element=element, fix=fix) from e
 
 
 def read_json(file: str | os.PathLike, kind: type) -> Any:

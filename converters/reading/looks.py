@@ -13,6 +13,7 @@ from ig2mj.errors import InputError
 from ..base import inputs
 from ..base.description import PackedImage, Rgba
 from ..base.file_access import FileGuard
+from ..base.xml_reader import shortened
 from .images import SUFFIXES, ImageError, open_image
 
 Texture = pathlib.Path | PackedImage
@@ -50,10 +51,41 @@ class TextureReader:
     folder: pathlib.Path
     warnings: list[str]
 
-    def file(self, name: str) -> pathlib.Path | None:
-        """Path of a texture that opens as an image; None (with a warning unless it is encrypted) otherwise."""
+    def find(self, name: str, folder: pathlib.Path | None = None) -> pathlib.Path:
+        """Path of a file that is named in a mesh or an MTL file in `folder` (default: the reader's own).
+
+        Exporters write paths of their own machine, and names in other letters: where there is no such file, one of that
+        name in the folder of the one that names it, or next to the mesh, is taken with a warning.
+        The path need not exist. Raises InputError as `FileGuard.resolve`.
+        """
+        error: InputError | None = None
+        folders = list(dict.fromkeys((folder or self.folder, self.folder)))
+        paths = []
+        for base in folders:
+            try:
+                paths.append(self.guard.resolve(name, self.element, base=base))
+            except InputError as e:
+                error = error or e
+        for path in paths:
+            if inputs.is_file(path) or encrypted_twin(path) is not None or is_encrypted(path):
+                return path
+        plain = name.strip().strip("\"'").replace("\\", "/")
+        for base in folders:
+            for near in (f for words in (plain, plain.rpartition("/")[2]) for f in _near(base, words)):
+                try:
+                    path = self.guard.resolve(str(near.relative_to(base)), self.element, base=base)
+                except InputError:
+                    continue
+                self.warn(f"{self.element}: there is no file '{shortened(name)}': {near.name} next to the mesh is used")
+                return path
+        if error is not None and not paths:
+            raise error
+        return paths[0]
+
+    def file(self, name: str, folder: pathlib.Path | None = None) -> pathlib.Path | None:
+        """Path of a texture that opens as an image (see `find`); None (with a warning unless encrypted) otherwise."""
         try:
-            path = self.guard.resolve(name, self.element, base=self.folder)
+            path = self.find(name, folder)
         except InputError as e:
             self.warn(f"a texture is left out: {e}")
             return None
@@ -81,13 +113,20 @@ class TextureReader:
         """The look of what has no texture coordinates: the image's mean colour, with a warning."""
         if look.texture is None:
             return look
-        text = f"{self.element}: it has no texture coordinates, and is drawn in the mean colour of"
-        self.warn(f"{text} {look.texture.name}")
+        text = f"{self.element}: what has no texture coordinates is rendered in the mean colour of {look.texture.name}"
+        self.warn(text)
         return SurfaceLook(mean_colour(look.texture, look.rgba))
 
     def warn(self, text: str) -> None:
         if text not in self.warnings:
             self.warnings.append(text)
+
+
+def _near(folder: pathlib.Path, name: str) -> list[pathlib.Path]:
+    """The file of that relative name, or those whose names differ in case; none for names that lead elsewhere."""
+    if not name or name.startswith("/") or ":" in name or ".." in name.split("/"):
+        return []
+    return [folder / name] if inputs.is_file(folder / name) else inputs.namesakes(folder / name)
 
 
 def content_of(texture: Texture) -> bytes:

@@ -24,6 +24,7 @@ from ..base import inputs
 from ..base.description import Mesh, Rgba
 from ..base.file_access import FileGuard
 from ..base.read_limits import check_limit, limits
+from ..base.text import LFS_FIX, LFS_POINTER
 from ..base.xml_reader import read_bytes
 from .collada import read_collada
 from .geometry_parts import MeshContent, MeshPart, MeshSource, parts_of
@@ -125,12 +126,17 @@ def _obj_parts(obj: ObjFile, file: pathlib.Path, textures: TextureReader) -> lis
         obj = dataclasses.replace(obj, material=np.zeros_like(obj.material), materials=[""])
     materials: dict[str, ObjMaterial] = {}
     complete = True
-    for library in obj.libraries[:MAX_LIBRARIES]:
+    for library in _libraries(obj, file, textures)[:MAX_LIBRARIES]:
         try:
-            materials |= read_mtl(textures.guard.resolve(library, textures.element, base=file.parent))
+            mtl = textures.find(library)
+            found, unread = read_mtl(mtl)
         except InputError as e:
             textures.warn(f"materials of {file.name} are left out: {e}")
             complete = False
+            continue
+        materials |= {name: dataclasses.replace(m, folder=mtl.parent) for name, m in found.items()}
+        if unread:
+            textures.warn(f"colours in {mtl.name} that are not read: {unread[0]}")
     if (unknown := [name for name in obj.materials[1:] if name not in materials]) and complete:
         textures.warn(f"{file.name} uses materials that no MTL file defines: {', '.join(unknown[:5])[:200]}")
     images: dict[str, pathlib.Path | None] = {}
@@ -140,7 +146,7 @@ def _obj_parts(obj: ObjFile, file: pathlib.Path, textures: TextureReader) -> lis
         look = SurfaceLook(material.rgba)
         if material.texture:
             if material.texture not in images:
-                images[material.texture] = textures.file(material.texture)
+                images[material.texture] = textures.file(material.texture, material.folder)
             if (image := images[material.texture]) is not None:
                 look = (
                     SurfaceLook(material.rgba, image)
@@ -153,6 +159,16 @@ def _obj_parts(obj: ObjFile, file: pathlib.Path, textures: TextureReader) -> lis
     if not parts:
         raise MeshError(file, "is empty: all its faces are degenerate")
     return parts
+
+
+def _libraries(obj: ObjFile, file: pathlib.Path, textures: TextureReader) -> list[str]:
+    """Names of MTL files: a line of words is one name with blanks if there is such a file, else several names."""
+    names = []
+    for line in obj.libraries:
+        words = line.split()
+        several = len(words) > 1 and all(word.lower().endswith(".mtl") for word in words)
+        names += words if several and not inputs.is_file(file.parent / line) else [line]
+    return names
 
 
 def _vertex_colour(colours: np.ndarray, file: pathlib.Path, textures: TextureReader) -> Rgba:
@@ -172,8 +188,8 @@ def _read_scene_file(
     """Parts of a file of another format than OBJ; textures: None for a collision file."""
     suffix = _suffix(file)
     raw = read_bytes(_existing(file), "scene_bytes" if suffix in WITH_IMAGES else "mesh_bytes")
-    if raw.startswith(b"version https://git-lfs"):
-        raise MeshError(file, "is a Git LFS pointer, not the mesh", fix="run git lfs pull")
+    if raw.startswith(LFS_POINTER):
+        raise MeshError(file, "is not the mesh", fix=LFS_FIX)
     try:
         with python_warnings.catch_warnings(), np.errstate(all="ignore"):
             python_warnings.simplefilter("ignore")

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.description import Mesh
 from ..base.read_limits import check_limit, limits
-from ..base.text import decoded, without_mark
+from ..base.text import LFS_FIX, LFS_POINTER, decoded, without_mark
 from ..base.xml_reader import MAX_NUMBER, parse_number, read_bytes
 from .mesh_limits import MeshError, check_faces, check_vertices
 
@@ -57,8 +57,8 @@ class ObjFile:
 def read_obj(file: pathlib.Path) -> ObjFile:
     """Reads an OBJ. Raises MeshError: no text, no faces, bad numbers, non-finite vertices, over a limit."""
     raw = without_mark(read_bytes(file, "mesh_bytes"))
-    if raw.startswith(b"version https://git-lfs"):
-        raise MeshError(file, "is a Git LFS pointer, not the mesh", fix="run git lfs pull")
+    if raw.startswith(LFS_POINTER):
+        raise MeshError(file, "is not the mesh", fix=LFS_FIX)
     if b"\0" in raw[:4096]:
         raise MeshError(file, "is not an OBJ file: it is not text")
     for kind, what in ((b"v", "vertices"), (b"vt", "texture coordinates"), (b"f", "faces")):
@@ -189,17 +189,18 @@ def group_meshes(obj: ObjFile) -> list[Mesh]:
 
 
 def material_meshes(obj: ObjFile) -> list[tuple[str, Mesh, np.ndarray | None, np.ndarray]]:
-    """(material name, mesh, uv [n, 2] or None, index [n] of its vertices in the file) per material that has faces;
-    vertices are split at texture seams."""
+    """(material name, mesh, uv [n, 2] or None, index [n] of its vertices in the file) per material that has faces, and
+    one more for those of its faces that have no texture coordinates; vertices are split at texture seams."""
     parts = []
     for index, rows in _rows_by_value(obj.material):
-        corners = obj.corners[rows]
-        textured = bool(len(obj.uv)) and bool(np.all(corners[..., 1] >= 0))
-        pairs = corners.reshape(-1, 2) if textured else corners.reshape(-1, 2) * [1, 0]
-        used, faces = np.unique(pairs, axis=0, return_inverse=True)
-        mesh = _mesh(obj.vertices[used[:, 0]], faces.reshape(-1, 3), obj.materials[index])
-        if len(mesh.faces):
-            parts.append((obj.materials[index], mesh, obj.uv[used[:, 1]] if textured else None, used[:, 0]))
+        has_uv = np.all(obj.corners[rows, :, 1] >= 0, axis=1) & bool(len(obj.uv))
+        for textured in (True, False):
+            corners = obj.corners[rows[has_uv == textured]]
+            pairs = corners.reshape(-1, 2) if textured else corners.reshape(-1, 2) * [1, 0]
+            used, faces = np.unique(pairs, axis=0, return_inverse=True)
+            mesh = _mesh(obj.vertices[used[:, 0]], faces.reshape(-1, 3), obj.materials[index])
+            if len(mesh.faces):
+                parts.append((obj.materials[index], mesh, obj.uv[used[:, 1]] if textured else None, used[:, 0]))
     return parts
 
 
@@ -237,32 +238,39 @@ def _polygon(words: list[str], vertices: int, uvs: int, file: pathlib.Path, line
 
 @dataclasses.dataclass
 class ObjMaterial:
-    """One `newmtl`: diffuse colour with opacity, and the name of its diffuse texture."""
+    """One `newmtl`: diffuse colour with opacity, and the name of its diffuse texture. folder: of the MTL file."""
 
     rgba: tuple[float, float, float, float] | None = None
     texture: str | None = None
+    folder: pathlib.Path | None = None
 
 
-def read_mtl(file: pathlib.Path) -> dict[str, ObjMaterial]:
-    """Materials of an MTL file; statements that make no sense are passed over. Raises InputError: unreadable."""
+def read_mtl(file: pathlib.Path) -> tuple[dict[str, ObjMaterial], list[str]]:
+    """(materials, lines of diffuse colours that are not read) of an MTL file. Raises InputError: unreadable."""
     materials: dict[str, ObjMaterial] = {}
+    unread: list[str] = []
     now = ObjMaterial()
-    for line in decoded(read_bytes(file, 2**24)).split("\n"):
+    for line in decoded(read_bytes(file, 2**24)).replace("\r", "\n").split("\n"):
         words = line.split()
         if not words:
             continue
-        values = [parse_number(w) for w in words[1:4]]
-        if words[0] == "newmtl":
+        kind, values = words[0].lower(), [parse_number(w) for w in words[1:4]]
+        if kind == "newmtl":
             now = materials.setdefault(" ".join(words[1:]), ObjMaterial())
-        elif words[0] == "Kd" and values and None not in values:
+        elif kind == "kd":
             grey = (values * 3)[:3] if len(values) == 1 else values  # one number stands for all three
-            if len(grey) == 3:
-                r, g, b = (min(max(float(v or 0.0), 0.0), 1.0) for v in grey)
-                now.rgba = (r, g, b, now.rgba[3] if now.rgba else 1.0)
-        elif words[0] in ("d", "Tr") and values and values[0] is not None:
-            opacity = values[0] if words[0] == "d" else 1.0 - values[0]
+            if len(grey) != 3 or None in grey:
+                unread.append(" ".join(words)[:60])
+                continue
+            r, g, b = (min(max(float(v or 0.0), 0.0), 1.0) for v in grey)
+            now.rgba = (r, g, b, now.rgba[3] if now.rgba else 1.0)
+        elif kind in ("d", "tr") and values and values[0] is not None:
+            opacity = values[0] if kind == "d" else 1.0 - values[0]
             r, g, b, _ = now.rgba or (0.8, 0.8, 0.8, 1.0)
             now.rgba = (r, g, b, min(max(opacity, 0.0), 1.0) or 1.0)  # exporters write d 0 for "not set"
-        elif words[0] == "map_Kd" and len(words) > 1:
+        elif kind == "map_kd" and len(words) > 1:
             now.texture = words[-1] if words[1].startswith("-") else line.split(None, 1)[1].strip()
-    return materials
+    for material in materials.values():
+        if material.texture and material.rgba and not any(material.rgba[:3]):
+            material.rgba = (1.0, 1.0, 1.0, material.rgba[3])  # exporters write Kd 0 0 0 where an image says the colour
+    return materials, unread

@@ -20,12 +20,25 @@ from .mesh_limits import MeshError, check_faces
 
 
 def read_stl(source: MeshSource) -> MeshContent:
-    """Binary or ASCII. Raises MeshError: over a limit."""
+    """Binary or ASCII. Bytes after the triangles that a binary header counts are passed over.
+
+    Raises MeshError: truncated, neither of both, or over a limit.
+    """
     raw = without_mark(source.raw)
-    # Three words in four of an ASCII facet are numbers; in binary a facet takes 50 bytes.
     ascii_ = raw.lstrip()[:5].lower() == b"solid" and b"facet" in raw[:4096].lower()
-    check_faces(raw.lower().count(b"endfacet") if ascii_ else (len(raw) - 84) // 50, source.file)
-    return _with_trimesh(raw, "stl", source)
+    if ascii_:
+        check_faces(raw.lower().count(b"endfacet"), source.file)
+        content = _with_trimesh(raw, "stl", source)
+        if not content.placed:
+            raise MeshError(source.file, "cannot be read as ASCII STL: it is truncated or damaged")
+        return content
+    count = int.from_bytes(raw[80:84], "little")
+    check_faces((len(raw) - 84) // 50, source.file)
+    if len(raw) < 84 or (len(raw) < 84 + 50 * count):
+        held = max(len(raw) - 84, 0) // 50
+        problem = f"its header counts {count} triangles, and {held} are there: it is truncated, or no STL file"
+        raise MeshError(source.file, problem if len(raw) >= 84 else "is too short for an STL file")
+    return _with_trimesh(raw[: 84 + 50 * count], "stl", source)
 
 
 def read_ply(source: MeshSource) -> MeshContent:

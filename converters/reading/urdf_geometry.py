@@ -177,7 +177,9 @@ def _drawn(part: MeshPart, look: SurfaceLook, textures: TextureReader) -> Surfac
 def _in_urdf(error: MeshError, guard: FileGuard, mesh: Element, named: str) -> InputError:
     """The error of a mesh file, seen from the URDF that names it if the file does not exist."""
     if error.problem == "mesh does not exist":
-        return InputError(guard.file, f"its mesh '{shortened(named)}' does not exist", element=where(mesh))
+        near = [path.name for path in inputs.namesakes(pathlib.Path(error.file))]
+        fix = f"the file is called '{near[0]}'" if near else ""
+        return InputError(guard.file, f"its mesh '{shortened(named)}' does not exist", element=where(mesh), fix=fix)
     return error
 
 

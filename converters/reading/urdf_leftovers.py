@@ -1,4 +1,4 @@
-"""What is no URDF and yet stands in URDFs: vectors of more than three numbers, and xacro's defaults.
+"""What is no URDF and yet stands in URDFs: vectors of more than three numbers, xacro's defaults, degrees.
 
 Bullet reads the first three numbers of a vector and passes over the rest. `$(optenv NAME default)` stays where a file
 of xacro or roslaunch was not expanded; the default is read, never the environment.
@@ -6,9 +6,10 @@ of xacro or roslaunch was not expanded; the default is read, never the environme
 
 from __future__ import annotations
 
+import math
 import re
 
-from ..base.xml_reader import Element, shortened, where
+from ..base.xml_reader import Element, parse_number, shortened, where
 
 VECTORS = (("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz"), ("mesh", "scale"), ("box", "size"))
 """Elements and attributes of three numbers."""
@@ -32,3 +33,22 @@ def read_leftovers(robot: Element, warnings: list[str]) -> None:
                     plain = " ".join(words[:3])
             if plain != text:
                 element.set(attribute, plain)
+
+
+UNLIMITED = 1000.0
+"""rad: limits from here on are written for "no limit"."""
+
+MOST_TURN, MOST_LIMIT = 2.0 * math.pi + 0.01, 4.0 * math.pi + 0.01
+"""rad: a roll, pitch or yaw beyond the first, or a revolute joint's limit beyond the second, may be in degrees."""
+
+
+def warn_of_degrees(robot: Element, warnings: list[str]) -> None:
+    """Angles of a URDF are in radians; those that are hardly meant so are read as they stand, with a warning."""
+    angles = [(e, "rpy", MOST_TURN) for e in robot.iter("origin")]
+    limits = (e for joint in robot.iterfind("joint[@type='revolute']") for e in joint.iterfind("limit"))
+    angles += [(e, side, MOST_LIMIT) for e in limits for side in ("lower", "upper")]
+    for element, attribute, most in angles:
+        values = [parse_number(word.removesuffix(",")) for word in (element.get(attribute) or "").split()]
+        if any(most < abs(v) < UNLIMITED for v in values if v is not None):
+            text = f"{attribute}='{shortened(element.get(attribute), 40)}' is read as radians; is it in degrees?"
+            warnings.append(f"{where(element)}: {text}")

@@ -30,6 +30,10 @@ ODD = {
     "thinner than a millimetre": (box("0.2 0.1 0.0005"), "is 0.5 mm thin"),
     "lighter than foam": (box("1 1 1") + inertial(0.5), "weighs 0.5 kg, 0.5 kg/m3"),
     "heavier than gold": (box("0.1 0.1 0.1") + inertial(50), "weighs 50 kg, 5e+04 kg/m3"),
+    "heavy far from where it is": (
+        box("0.2 0.2 0.2") + '<inertial><mass value="1"/><origin xyz="50 0 0"/></inertial>',
+        "has its centre of mass 49.9 m outside",
+    ),
     "seen twice as large": (box("0.2 0.2 0.2") + box("0.2 0.5 0.2", "visual"), "is 0.2 m along y where it collides"),
     "seen half as large": (
         box("0.2 0.2 0.5") + box("0.2 0.2 0.2", "visual"),

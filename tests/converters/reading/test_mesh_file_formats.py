@@ -9,9 +9,13 @@ import pytest
 import trimesh
 from ig2mj_converters.base.description import PackedImage
 from ig2mj_converters.base.file_access import FileGuard
+from ig2mj_converters.base.xml_reader import read_xml
 from ig2mj_converters.bodies.solids import hull_volume, joined, signed_volume
+from ig2mj_converters.reading.json_reader import read_json
 from ig2mj_converters.reading.mesh_files import read_collision, read_visual
 from PIL import Image
+
+from ig2mj.errors import InputError
 
 
 def collision(file):
@@ -278,3 +282,116 @@ def test_a_texture_packed_into_a_glb_is_kept(folder):
     with Image.open(io.BytesIO(part.texture.content)) as kept:
         assert kept.convert("RGB").tobytes() == image.tobytes()
     assert len(part.uv[0]) == len(part.meshes[0].vertices)
+
+
+CORNER = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\n"
+SIDES = "f 1/1 2/2 3/3\nf 1/1 2/2 4/3\nf 2/1 3/2 4/3\nf 1/1 3/2 4/3\n"
+
+
+def _visual(folder, head: str, mtl: str, mtl_name: str = "m.mtl", faces: str = SIDES):
+    """(parts, warnings) of an OBJ in meshes/, whose only image is meshes/t.png."""
+    Image.new("RGB", (4, 4), (200, 0, 0)).save(folder.write("meshes/t.png", ""))
+    folder.write(f"meshes/{mtl_name}", mtl)
+    file = folder.write("meshes/v.obj", f"{head}\n{CORNER}usemtl k\n{faces}")
+    warnings: list[str] = []
+    return read_visual(file, FileGuard(file, root=folder.root), "x", warnings), warnings
+
+
+@pytest.mark.parametrize(
+    ("head", "file", "warns"),
+    [
+        ("mtllib my own.mtl", "my own.mtl", False),
+        ("mtllib a.mtl m.mtl", "m.mtl", True),  # two files, of which one is not there
+        ('mtllib "m.mtl"', "m.mtl", True),
+        ("mtllib M.MTL", "m.mtl", True),
+        ("mtllib /home/somebody/m.mtl", "m.mtl", True),
+        ("mtllib C:\\Users\\somebody\\m.mtl", "m.mtl", True),
+    ],
+)
+def test_materials_are_found_as_exporters_name_them(folder, head, file, warns):
+    """What is not where it is said to be is taken from next to the mesh, with a warning."""
+    (part,), warnings = _visual(folder, head, "newmtl k\nKd 0.2 0.4 0.6\n", file)
+    assert part.rgba == (0.2, 0.4, 0.6, 1.0)
+    assert bool(warnings) == warns
+
+
+@pytest.mark.parametrize(
+    ("statement", "warns"),
+    [
+        ("map_Kd t.png", False),
+        ("map_kd t.png", False),
+        ("MAP_KD T.PNG", True),
+        ('map_Kd "t.png"', True),
+        ("map_Kd /home/somebody/textures/t.png", True),
+        ("map_Kd D:\\textures\\t.png", True),
+        ("map_Kd ../../elsewhere/t.png", True),
+    ],
+)
+def test_textures_are_found_as_exporters_name_them(folder, statement, warns):
+    (part,), warnings = _visual(folder, "mtllib m.mtl", f"newmtl k\n{statement}\n")
+    assert part.texture == (folder.root / "meshes/t.png").resolve()
+    assert [("t.png next to the mesh is used" in w) for w in warnings] == [True] * warns
+
+
+def test_a_texture_is_looked_for_next_to_its_mtl_and_then_next_to_its_mesh(folder):
+    mtl = "newmtl k\nmap_Kd t.png\n"
+    (part,), warnings = _visual(folder, "mtllib looks/m.mtl", mtl, "looks/m.mtl")
+    assert part.texture == (folder.root / "meshes/t.png").resolve() and not warnings
+    folder.image("meshes/looks/t.png", np.zeros((2, 2, 3)))
+    (part,), warnings = _visual(folder, "mtllib looks/m.mtl", mtl, "looks/m.mtl")
+    assert part.texture == (folder.root / "meshes/looks/t.png").resolve() and not warnings
+
+
+def test_only_faces_without_texture_coordinates_lose_the_texture(folder):
+    faces = "f 1/1 2/2 3/3\nf 1 2 4\nf 2 3 4\nf 1/1 3/2 4/3\n"
+    (textured, flat), warnings = _visual(folder, "mtllib m.mtl", "newmtl k\nmap_Kd t.png\n", faces=faces)
+    assert textured.texture is not None and len(textured.meshes[0].faces) == len(flat.meshes[0].faces) == 2
+    assert flat.rgba == pytest.approx((200 / 255, 0, 0, 1)) and "mean colour" in warnings[0]
+
+
+@pytest.mark.parametrize("colour", ["spectral f.rfl 1", "0,5 0,5 0,5", "nan 0 0", "0.5 0.5"])
+def test_a_colour_that_is_not_read_is_a_warning(folder, colour):
+    (part,), warnings = _visual(folder, "mtllib m.mtl", f"newmtl k\nKd {colour}\n")
+    assert part.rgba is None and f"not read: Kd {colour}" in warnings[0]
+
+
+def test_black_under_a_texture_means_the_texture(folder):
+    (part,), _ = _visual(folder, "mtllib m.mtl", "newmtl k\nKd 0 0 0\nd 0.5\nmap_Kd t.png\n")
+    assert part.rgba == (1, 1, 1, 0.5) and part.texture is not None
+
+
+def _stl(count: int) -> bytes:
+    triangles = np.zeros(count, dtype=[("numbers", "<f4", 12), ("more", "<u2")])
+    triangles["numbers"] = np.arange(12 * count).reshape(count, 12) ** 2 % 7
+    return b"made somewhere".ljust(80) + count.to_bytes(4, "little") + triangles.tobytes()
+
+
+def test_bytes_after_the_triangles_of_an_stl_are_passed_over(folder):
+    plain, more = (collision(folder.write(f"{n}.stl", _stl(4) + b"x" * n))[0][0] for n in (0, 60))
+    np.testing.assert_array_equal(plain.vertices[plain.faces], more.vertices[more.faces])
+
+
+@pytest.mark.parametrize(
+    ("raw", "problem"),
+    [
+        (_stl(4)[:-10], "its header counts 4 triangles, and 3 are there"),
+        (_stl(4)[:60], "too short"),
+        (b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nver", "truncated or damaged"),
+    ],
+)
+def test_a_truncated_stl_says_so(folder, raw, problem):
+    with pytest.raises(InputError, match=problem):
+        collision(folder.write("c.stl", raw))
+
+
+def test_pointers_of_git_lfs_are_named(folder):
+    """As meshes, URDFs, JSON files and textures: large files of a repository that was cloned without them."""
+    pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"
+    readers = {"c.obj": collision, "c.stl": collision, "x.urdf": lambda f: read_xml(f, "robot"),
+               "x.json": lambda f: read_json(f, dict)}  # fmt: skip
+    for name, reader in readers.items():
+        with pytest.raises(InputError, match="run git lfs pull"):
+            reader(folder.write(name, pointer))
+    folder.write("p.png", pointer)
+    _, warnings = _visual(folder, "mtllib m.mtl", "newmtl k\nmap_Kd ../p.png\n")
+    assert "run git lfs pull" in warnings[0]

@@ -302,3 +302,43 @@ def test_damaged_files_never_crash_the_reader(tmp_path_factory, make, damage, at
             read_urdf(folder / "x.urdf", "thing", "x")
         except InputError as e:
             assert str(folder) in str(e)
+
+
+def test_an_origin_may_have_a_quaternion(root, make):
+    """`quat_xyzw` of URDF 1.2: x, y, z, w."""
+    quarter = '<origin xyz="1 2 3" quat_xyzw="0 0 2 2"/>'
+    box = f'<collision>{quarter}<geometry><box size="1 1 1"/></geometry></collision>'
+    (shape,) = read(root, make.link("a", box), make=make).links["a"].collisions
+    np.testing.assert_allclose(shape.pose, [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("origin", "problem"),
+    [('rpy="0 0 1" quat_xyzw="0 0 0 1"', "both rpy and quat_xyzw"), ('quat_xyzw="0 0 0 0"', "length zero")],
+)
+def test_an_origin_with_no_or_two_rotations_is_refused(root, make, origin, problem):
+    with pytest.raises(InputError, match=problem):
+        read(root, make.link("a"), make.link("b"), make.joint("j", "fixed", "a", "b").replace(
+            '<origin xyz="0 0 0" rpy="0 0 0"/>', f"<origin {origin}/>"), make=make)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("rpy", "kind", "limits", "warned"),
+    [
+        ("0 0 90", "revolute", ("-1.5", "1.5"), 1),
+        ("0 0 1.57", "revolute", ("-90", "90"), 2),
+        ("6.28 0 -6.28", "revolute", ("-12.56", "12.56"), 0),
+        ("0 0 1.57", "prismatic", ("-90", "90"), 0),
+        ("0 0 1.57", "revolute", ("-10000", "10000"), 0),
+    ],
+)
+def test_angles_that_are_hardly_radians_are_read_with_a_warning(root, make, rpy, kind, limits, warned):
+    joint = make.joint("j", kind, "a", "b", make.limit(*limits), rpy=rpy.split())
+    model = read(root, make.link("a"), make.link("b"), joint, make=make)
+    assert sum("in degrees?" in warning for warning in model.warnings) == warned
+    assert model.joints["j"].upper == float(limits[1])
+
+
+def test_a_mesh_whose_name_has_other_capitals_is_named(root, make):
+    with pytest.raises(InputError, match=r"'C\.obj' does not exist \(the file is called 'c\.obj'\)"):
+        read(root, make.link("a", make.shape("collision", "C.obj")), make=make, c_obj=make.box_obj())
