@@ -19,7 +19,7 @@ from jaxtyping import Float
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import ActionError, StaleStateError
 from ig2mj.process import entry_point
-from ig2mj.sensors.registry import SENSORS
+from ig2mj.sensors.registry import sensor_named
 from ig2mj.tasks.custom.objective import CustomObjective
 
 SOON = 3
@@ -135,7 +135,8 @@ def _same(a: Any, b: Any, what: str, like: Likeness) -> None:
         close = within if np.issubdtype(x.dtype, np.floating) else 0.0
         differs = ~np.isclose(x, y, rtol=close, atol=close) if close else x != y
         name = str(getattr(path[-1], "key", ""))
-        if within and name in SENSORS and SENSORS[name].looks:
+        sensor = sensor_named(name)
+        if within and sensor is not None and sensor.looks:
             rays = differs.any(-1).reshape(len(differs), -1)
             differs = rays.sum(1) > max(1, int(JUMPS * rays.shape[1]))
         if differs.any():

@@ -205,7 +205,10 @@ def add_floating_hand(
             values = list(getattr(key, field))
             if values:
                 setattr(key, field, [*values, *[0.0] * len(servos)])
-    return AgentEntry(name=name, body=name, camera=f"{name}/eye", fingers=fingers, hands=[name])
+    eye = f"{name}/eye"
+    return AgentEntry(
+        name=name, body=name, camera=eye, fingers=fingers, hands=[name], wrist_cameras={"right_wrist": eye}
+    )
 
 
 def hand_ctrl(offset: Vector = (0, 0, 0), turn: Vector = (0, 0, 0), closed: float | int = 0) -> np.ndarray:

@@ -30,6 +30,7 @@ from ig2mj.demos.whole_output import whole_output
 from ig2mj.envs.environment import Environment
 from ig2mj.errors import InputError
 from ig2mj.install_hint import require_extras
+from ig2mj.sensors.cameras import split_name
 
 VERSION = "v3.0"
 CHUNK_FILES, DATA_MB, VIDEO_MB = 1000, 100, 200
@@ -237,7 +238,7 @@ def _whole_rate(replayer: Replayer) -> int:
     if abs(rate - round(rate)) > 1e-6:
         problem = f"has {rate:.6g} steps a second, and LeRobot's datasets have a whole number"
         raise InputError(file, problem, element="attribute period", fix="export it to robomimic")
-    if "depth" in env.observation_spaces and env.sensor_options.depth_high > DEEPEST:
+    if any(_is_depth(name) for name in env.observation_spaces) and env.sensor_options.depth_high > DEEPEST:
         problem = f"depth_high = {env.sensor_options.depth_high:g}: whole millimetres go up to {DEEPEST} m"
         raise InputError(file, problem, element="attribute sensors", fix="export it to robomimic")
     return round(rate)
@@ -249,9 +250,23 @@ def _before(place: _Place) -> tuple[int, int]:
 
 
 def _name(observation: str) -> str:
-    if observation == "rgb":
-        return "observation.images.rgb"
-    return NAMES.get(observation, f"observation.{observation}")
+    if _is_rgb(observation):
+        return f"observation.images.{camera_key(observation)}"
+    return NAMES.get(observation, f"observation.{observation.replace('/', '.')}")
+
+
+def camera_key(observation: str) -> str:
+    """Of images in colour in LeRobot's datasets and environments: `rgb` of the camera `head`, else the camera's."""
+    camera, _ = split_name(observation)
+    return "rgb" if observation == "rgb" else camera.replace("/", "_")
+
+
+def _is_rgb(observation: str) -> bool:
+    return split_name(observation)[1] == "rgb"
+
+
+def _is_depth(observation: str) -> bool:
+    return split_name(observation)[1] == "depth"
 
 
 def _features(env: Environment) -> dict[str, dict[str, Any]]:
@@ -259,7 +274,7 @@ def _features(env: Environment) -> dict[str, dict[str, Any]]:
     names = {"privileged_state": list(env.privileged_names), "proprioception": list(env.proprioception_names)}
     features: dict[str, dict[str, Any]] = {"action": _feature(np.float32, env.action_space.shape, env.action_names)}
     for name, space in env.observation_spaces.items():
-        if name == "rgb":
+        if _is_rgb(name):
             listed = ["height", "width", "channels"]
             features[_name(name)] = {"dtype": "video", "shape": [*space.shape[:2], 3], "names": listed}
             continue
@@ -278,7 +293,7 @@ def _feature(dtype: Any, shape: tuple[int, ...], names: Any) -> dict[str, Any]:
 
 def _column(name: str, rows: np.ndarray) -> np.ndarray:
     """As it is written: depths in whole millimetres, other floats in single precision."""
-    if name == "depth":
+    if _is_depth(name):
         return (rows * 1000.0).round().astype(np.uint16)
     return rows.astype(np.float32) if rows.dtype.kind == "f" else rows
 

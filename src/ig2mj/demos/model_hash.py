@@ -14,6 +14,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Int
 
+from ig2mj.agents.wrist_cameras import is_wrist_camera
+
 APPEARANCE = ("cam_", "light_", "mat_", "tex_", "skin_", "mesh_", "bvh_", "oct_", "name_", "names_", "text_", "tuple_")
 """Beginnings of the names of arrays that physics does not depend on, or that are derived from others. Meshes count
 where a geom that matters has them."""
@@ -55,9 +57,13 @@ def physics_hash(model: mujoco.MjModel) -> str:
 
 
 def appearance_hash(model: mujoco.MjModel) -> str:
-    """Of all that cameras, and rays that see what cameras see, meet."""
+    """Of all that cameras, and rays that see what cameras see, meet. Cameras on hands do not count, so that recordings
+    made before robots had them can be compared."""
     hashed = hashlib.blake2b(digest_size=16)
+    own = np.array([not is_wrist_camera(model.camera(k).name) for k in range(model.ncam)], bool)
     for name, array in _arrays(model):
+        if name.startswith("cam_"):
+            array = array[own]
         seen = name.startswith(("cam_", "light_", "mat_", "tex_", "skin_", "mesh_", "geom_"))
         seen |= name.startswith(("site_", "body_pos", "body_quat", "qpos0"))
         if seen and not name.endswith(("_pathadr", "_bvhadr", "_bvhnum")):

@@ -19,7 +19,7 @@ from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import Ig2mjError, InputError
 from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.base import SensorOptions
-from ig2mj.sensors.registry import SENSORS
+from ig2mj.sensors.registry import sensor_named
 
 Write = Callable[[int, Run, dict[str, np.ndarray]], None]
 """Called with the index of a run among the selected ones, the run, and its observations [T + 1, ...] by name."""
@@ -87,7 +87,7 @@ def check_observations(replayer: Replayer) -> None:
     found = differences(recording.header, here, tuple(names))
     if "observations" in recording.header:
         recorded = recording.value("observations", list)
-        seen = [name for name in env.observation_spaces if name in recorded and name in SENSORS and SENSORS[name].looks]
+        seen = [name for name in env.observation_spaces if name in recorded and _looks(name)]
         if seen:
             found += _other_settings(replayer)
             if recording.header.get("appearance_hash") != here["appearance_hash"]:
@@ -95,6 +95,12 @@ def check_observations(replayer: Replayer) -> None:
     if found:
         fix = "`ig2mj demos replay --by state --sensors NAMES` makes observations of what is here now"
         raise InputError(recording.file, f"cannot be exported as it was recorded: {'; '.join(found)}", fix=fix)
+
+
+def _looks(observation: str) -> bool:
+    """It is of images or rays."""
+    sensor = sensor_named(observation)
+    return sensor is not None and sensor.looks
 
 
 def _other_settings(replayer: Replayer) -> list[str]:

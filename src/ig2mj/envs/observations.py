@@ -3,6 +3,7 @@
 | name | content | shape |
 |---|---|---|
 | `rgb`, `depth`, `scan`, ... | any sensor of `ig2mj.sensors.registry.SENSORS` (docs/guide/sensors.md) | the sensor's |
+| `right_wrist/rgb`, ... | a sensor of images of another camera (`ig2mj.sensors.cameras`) | the sensor's |
 | `privileged_state` | ground truth, in the frame of the robot's base (`Objective.vectors`) | [p] |
 | a function's name | what the function gives (`ig2mj.tasks.custom`) | [n] |
 | others of the task | such as iGibson's `task_obs` of navigation (`Objective.vectors`) | [n] |
@@ -25,6 +26,7 @@ from ig2mj.envs.state import StepContext
 from ig2mj.errors import PluginError, UnknownNameError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.sensors.base import Memory, Space
+from ig2mj.sensors.cameras import split_name
 from ig2mj.sensors.noise import noisy
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
@@ -45,14 +47,16 @@ def check_names(names: Sequence[str], objective: Objective) -> list[str]:
       UnknownNameError: there is no such observation; with near matches. PluginError: a sensor of a plug-in has the name
         of an observation of the task.
     """
-    known = (*objective.vectors, *SENSORS)
+    known = (*objective.vectors, *SENSORS)  # without cameras' names
     added = SENSORS.sources()
     for name in names:
         if name in objective.vectors and name in added:
             what = f"sensor '{name}' of {added[name]}"
             raise PluginError(f"{what}: the task has an observation of this name; rename the sensor")
-        if name not in known:
-            raise UnknownNameError("observation", name, known)
+        _, sensor = split_name(name)
+        if name not in known and (sensor == name or sensor not in SENSORS):
+            prefix = name.removesuffix(sensor)
+            raise UnknownNameError("observation", name, known if not prefix else [f"{prefix}{one}" for one in SENSORS])
     return [name for name in names if name not in objective.vectors]
 
 

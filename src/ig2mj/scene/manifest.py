@@ -142,6 +142,7 @@ class AgentEntry(msgspec.Struct, omit_defaults=True):
     `laser` is where its scanner stands, m in the frame of the base (x forward, z up), None where it has none.
     `no_contact` names, for bodies of the agent, categories of objects that they pass through. For hands of `assisted`
     agents equality constraints to everything graspable are compiled (`ig2mj.scene.grasp_equalities`).
+    `wrist_cameras` are the cameras on its hands by their names in observations, "right_wrist" and "left_wrist".
     """
 
     name: str
@@ -152,6 +153,7 @@ class AgentEntry(msgspec.Struct, omit_defaults=True):
     no_contact: dict[str, list[str]] = {}
     assisted: bool = False
     laser: tuple[float, float, float] | None = None
+    wrist_cameras: dict[str, str] = {}
 
 
 class Manifest(msgspec.Struct, omit_defaults=True):

@@ -19,6 +19,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process.deprecation import warn_renamed
 from ig2mj.scene.scene import PLAIN, Scene, check_looks
+from ig2mj.sensors.cameras import HEAD, CameraView, camera_view
 from ig2mj.sensors.images import Images, Pose, RayPattern
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
@@ -57,6 +58,8 @@ class SensorOptions:
       shadows: whether images have them; they cost six times the rest natively, twice on a GPU.
       looks: how images show the home: one of `ig2mj.scene.scene.LOOKS`. Policies that see images were trained with
         `CAMERA_LOOKS`.
+      cameras: width and height, or one number for both, of the images of cameras that have another size, by the
+        camera's name (`ig2mj.sensors.cameras`); `rows` are of the camera `head` only.
     """
 
     width: int = 128
@@ -80,6 +83,7 @@ class SensorOptions:
     shadows: bool = False
     rows: tuple[int, int] | None = None
     looks: str = CAMERA_LOOKS
+    cameras: Mapping[str, tuple[int, int]] = dataclasses.field(default_factory=dict, hash=False)
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> SensorOptions:
@@ -88,7 +92,7 @@ class SensorOptions:
         for name, value in values.items():
             if name not in default:
                 raise UnknownNameError("setting of sensors", name, default)
-            kinds = {"rows": (list, tuple, type(None)), "shadows": bool, "looks": str}.get(name, (int, float))
+            kinds = _KINDS.get(name, (int, float))
             if not isinstance(value, kinds) or (isinstance(value, bool) and kinds is not bool):
                 raise EngineError(f"{name} = {value!r}: no value of this setting of sensors")
         check_looks(values.get("looks", CAMERA_LOOKS))
@@ -109,6 +113,25 @@ class SensorOptions:
                 raise EngineError(f"{name} = {getattr(self, name)}: a probability is between 0 and 1")
         if not 0 < self.scan_angle <= 360:
             raise EngineError(f"scan_angle = {self.scan_angle}: between 0 and 360 degrees")
+        object.__setattr__(self, "cameras", {name: _size(name, size) for name, size in self.cameras.items()})
+
+    def of_camera(self, name: str) -> SensorOptions:
+        """With `width` and `height` of a camera's images, and `rows` where they are its rows."""
+        width, height = self.cameras.get(name, (self.width, self.height))
+        return dataclasses.replace(self, width=width, height=height, rows=self.rows if name == HEAD else None)
+
+
+_KINDS: dict[str, Any] = {"rows": (list, tuple, type(None)), "shadows": bool, "looks": str, "cameras": Mapping}
+"""Of the values of settings that are no numbers."""
+
+
+def _size(camera: str, given: Any) -> tuple[int, int]:
+    """Width and height of a camera's images. Raises EngineError: these are none."""
+    size = (given, given) if isinstance(given, int) else given
+    whole = isinstance(size, list | tuple) and len(size) == 2 and all(type(n) is int and n > 0 for n in size)
+    if not whole:
+        raise EngineError(f"cameras: '{camera}' = {given!r}: width and height in pixels, such as [320, 240]")
+    return size[0], size[1]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -117,6 +140,7 @@ class Setup:
 
     Attributes:
       scene: with the agent. model: constants of the states. controller: of the agent, whose number is `agent`.
+      options: of the camera `camera_name` (`SensorOptions.of_camera`), which is one of `ig2mj.sensors.cameras`.
     """
 
     scene: Scene
@@ -124,14 +148,12 @@ class Setup:
     controller: Controller
     options: SensorOptions
     agent: int = 0
+    camera_name: str = HEAD
 
-    @property
-    def camera(self) -> str:
-        """Name of the agent's camera. Raises EngineError where it has none."""
-        entry = self.scene.manifest.agents[self.agent]
-        if not entry.camera:
-            raise EngineError(f"the robot '{entry.name}' has no camera")
-        return entry.camera
+    @functools.cached_property
+    def camera(self) -> CameraView:
+        """The camera that is read. Raises as `camera_view`."""
+        return camera_view(self.scene, self.controller, self.agent, self.camera_name)
 
     @property
     def laser(self) -> tuple[float, float, float]:
@@ -144,18 +166,24 @@ class Setup:
     @functools.cached_property
     def slopes(self) -> tuple[float, float]:
         """Half width and half height of the camera's view at distance 1."""
-        up = float(np.tan(self.scene.tables.agent_fovy[self.agent] / 2))
+        up = float(np.tan(self.camera.fovy / 2))
         return up * self.options.width / self.options.height, up
 
 
 @struct.dataclass
 class Memory:
-    """What was where at the last reading: from which flow is computed. World frame."""
+    """What was where at the last reading: from which flow is computed. World frame.
+
+    Attributes:
+      eye_pos, eye_quat: of the camera. body_pos, body_quat: of all bodies.
+      others: poses of further cameras whose flow is read, by name; those of one camera are what its sensors get.
+    """
 
     eye_pos: Float[Array, "W 3"]
     eye_quat: Float[Array, "W 4"]
     body_pos: Float[Array, "W B 3"]
     body_quat: Float[Array, "W B 4"]
+    others: dict[str, Pose] = dataclasses.field(default_factory=dict)
 
 
 @struct.dataclass
@@ -164,7 +192,7 @@ class Percept:
 
     Attributes:
       view, states, controller: of the present (the last is what the controller remembers).
-      eye: pose of the agent's camera. images: None where no sensor asked for any.
+      eye: pose of the camera that is read. images: of this camera alone; None where no sensor asked for any.
       before: None where no sensor asked for it. keys: of the randomness of each world's reading.
     """
 

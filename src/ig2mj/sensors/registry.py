@@ -5,6 +5,7 @@ from __future__ import annotations
 from ig2mj.errors import UnknownNameError
 from ig2mj.plugins import Registry
 from ig2mj.sensors.base import Sensor
+from ig2mj.sensors.cameras import split_name
 from ig2mj.sensors.definitions.bump import BUMP
 from ig2mj.sensors.definitions.colour import RGB
 from ig2mj.sensors.definitions.depth import DEPTH
@@ -42,6 +43,13 @@ OWN: dict[str, Sensor] = {
 
 SENSORS: Registry[Sensor] = Registry("sensor", "an ig2mj.sensors.Sensor", lambda thing: isinstance(thing, Sensor), OWN)
 """`OWN`, and those of plug-ins."""
+
+
+def sensor_named(observation: str) -> Sensor | None:
+    """The sensor of an observation's name, with or without a camera's name before it; None: it is of none."""
+    camera, name = split_name(observation)
+    sensor = SENSORS[name] if name in SENSORS else None
+    return sensor if sensor is None or observation == name or sensor.images else None
 
 
 def find_sensor(name: str) -> Sensor:

@@ -3,14 +3,16 @@
     sensors = SensorSuite(engine, scene, rules.model, controller, ["rgb", "depth", "scan"])
     readings, memory = sensors.read(physics, view, states, controller_state)
 
-All of them share one camera, which renders what they need and nothing else. Where the engine's physics can be traced,
-`read_fn` may be part of a compiled program.
+A name may begin with that of a camera (`right_wrist/rgb`; `ig2mj.sensors.cameras`). Sensors of images of the same size
+share one renderer, which renders what they need and nothing else. Where the engine's physics can be traced, `read_fn`
+may be part of a compiled program.
 
 Axes: W worlds.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 from collections.abc import Collection, Sequence
 from typing import Any
@@ -27,7 +29,8 @@ from ig2mj.geometry.poses import compose
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors.base import Memory, Percept, Sensor, SensorOptions, Setup, Space
-from ig2mj.sensors.images import Camera, Images, Pose
+from ig2mj.sensors.cameras import HEAD, CameraView, check_cameras, split_name
+from ig2mj.sensors.images import Camera, Images, Pose, RayPattern
 from ig2mj.sensors.registry import find_sensor
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
@@ -40,6 +43,32 @@ CAMERAS = {
     "ray caster": "ig2mj.sensors.batch_camera:BatchCamera",
 }
 """By `Engine.renderer`: module and class of what makes images. A module is imported where images are made."""
+
+
+OF_CAMERAS = ("rgb", "depth", "segmentation", "geom")
+"""Fields of `Images` with an axis of cameras."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Channel:
+    """One observation: a sensor of a camera."""
+
+    name: str
+    sensor: Sensor
+    setup: Setup
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Renderer:
+    """What makes images of one size.
+
+    Attributes:
+      numbers: of each camera among those of `camera`, by its name in observations. views: likewise.
+    """
+
+    camera: Camera
+    numbers: dict[str, int]
+    views: dict[str, CameraView]
 
 
 @entry_point
@@ -66,36 +95,65 @@ class SensorSuite:
         Args:
           engine: whose worlds are perceived. scene: theirs. model: constants of the states.
           controller: of the agent, which is number `agent` of the scene.
-          names: of sensors (`ig2mj.sensors.registry.SENSORS`), or a single one.
+          names: of sensors (`ig2mj.sensors.registry.SENSORS`), those of images with or without a camera's name
+            before them; or a single one.
           varied: axes of `ig2mj.Randomize` that are on; readings then take what was drawn.
 
         Raises:
-          UnknownNameError: no such sensor. EngineError: the robot lacks what a sensor needs, or the engine cannot make
-            images (only "native" and "warp" can).
+          UnknownNameError: no such sensor or camera. EngineError: the robot lacks what a sensor needs, or the engine
+            cannot make images (only "native" and "warp" can).
         """
-        self._sensors = [find_sensor(name) for name in ((names,) if isinstance(names, str) else names)]
         self.options = options or SensorOptions()
-        self._setup = Setup(scene, model, controller, self.options, agent)
-        self.spaces: dict[str, Space] = {s.name: s.space(self._setup) for s in self._sensors}
+        given = (names,) if isinstance(names, str) else names
+        self._channels = [self._channel(name, scene, model, controller, agent) for name in given]
+        self._own = Setup(scene, model, controller, self.options, agent)
+        self.spaces: dict[str, Space] = {c.name: c.sensor.space(c.setup) for c in self._channels}
         self._varied = frozenset(varied) & {"lights", "camera"}
-        self._felt = [s for s in self._sensors if not s.looks]
-        self._seen = [s for s in self._sensors if s.looks]
+        self._felt = [c for c in self._channels if not c.sensor.looks]
+        self._seen = [c for c in self._channels if c.sensor.looks]
         self._patterns = {}
-        for sensor in self._seen:
-            if sensor.rays is not None:
-                pattern = sensor.rays(self._setup)
-                self._patterns[pattern.name] = (pattern, sensor.ray_pose)
+        for channel in self._seen:
+            if channel.sensor.rays is not None:
+                pattern = channel.sensor.rays(channel.setup)
+                self._patterns[pattern.name] = (pattern, channel.sensor.ray_pose)
         if "scan" in self._patterns:
-            _ = self._setup.laser  # raises where there is none
-        self._camera = self._make_camera(engine) if self._seen else None
-        self._remembers = any(s.remembers for s in self._seen)
+            _ = self._own.laser  # raises where there is none
+        self._renderers = self._make_renderers(engine) if self._seen else []
+        self._remembers = any(c.sensor.remembers for c in self._seen)
         self._poses, self._finish = engine.compile(self._poses_fn), engine.compile(self._finish_fn)
         self._feel, self._remember = engine.compile(self.feel_fn), engine.compile(self._memory)
         self._whole = engine.program(self.read_fn)
 
-    def _make_camera(self, engine: Engine) -> Camera:
-        requested = frozenset().union(*(s.images for s in self._seen))
-        options = self._setup.options
+    def _channel(self, name: str, scene: Scene, model: StateModel, controller: Controller, agent: int) -> Channel:
+        """What an observation's name asks for. Raises UnknownNameError, EngineError."""
+        camera, sensor_name = split_name(name)
+        sensor = find_sensor(sensor_name)
+        if name != sensor_name and not sensor.images:
+            fix = f"take '{sensor_name}'"
+            raise EngineError(f"observation '{name}': the sensor '{sensor_name}' has no images of a camera ({fix})")
+        return Channel(name, sensor, Setup(scene, model, controller, self.options.of_camera(camera), agent, camera))
+
+    def _make_renderers(self, engine: Engine) -> list[Renderer]:
+        """One for each size of images, the first of which casts the rays, too."""
+        if engine.renderer not in CAMERAS:
+            raise EngineError(
+                f"the {engine.name} engine neither renders images nor casts rays (take 'native' or 'warp')"
+            )
+        own = self._own
+        check_cameras([c.name for c in self._seen], self.options.cameras, own.scene, own.controller, own.agent)
+        sizes: dict[tuple[Any, ...], list[Channel]] = {}
+        for channel in self._seen:
+            options = channel.setup.options
+            if channel.sensor.images:
+                sizes.setdefault((options.width, options.height, options.rows), []).append(channel)
+        patterns = [pattern for pattern, _ in self._patterns.values()]
+        rays = [patterns, *[[]] * (len(sizes) - 1)]
+        groups = list(sizes.values()) or [[]]
+        return [self._make_renderer(engine, group, own) for group, own in zip(groups, rays, strict=True)]
+
+    def _make_renderer(self, engine: Engine, channels: Sequence[Channel], rays: Sequence[RayPattern]) -> Renderer:
+        options = channels[0].setup.options if channels else self.options
+        requested = frozenset[str]().union(*(c.sensor.images for c in channels))
         settings: dict[str, Any] = {
             "width": options.width,
             "height": options.height,
@@ -103,33 +161,31 @@ class SensorSuite:
             "shadows": options.shadows,
             "rows": options.rows,
             "looks": options.looks,
-            "rays": [pattern for pattern, _ in self._patterns.values()],
+            "rays": list(rays),
             **{name: name in requested for name in ("rgb", "depth", "segmentation")},
         }
-        cameras = [self._setup.camera] if requested else []
-        if engine.renderer not in CAMERAS:
-            raise EngineError(
-                f"the {engine.name} engine neither renders images nor casts rays (take 'native' or 'warp')"
-            )
         if self._varied:
             settings["varied"] = self._varied
+        views = {c.setup.camera_name: c.setup.camera for c in channels}
         module, kind = CAMERAS[engine.renderer].split(":")
-        return getattr(importlib.import_module(module), kind)(engine, self._setup.model, cameras, **settings)
+        cameras = list(dict.fromkeys(view.camera for view in views.values()))
+        made = getattr(importlib.import_module(module), kind)(engine, self._own.model, cameras, **settings)
+        return Renderer(made, {name: cameras.index(view.camera) for name, view in views.items()}, views)
 
     def prepare_devices(self, devices: Sequence[Any]) -> None:
         """Allocates memory of cameras on other devices of this process, before programs for them are compiled."""
-        if self._camera is not None:
-            self._camera.prepare_devices(devices)
+        for renderer in self._renderers:
+            renderer.camera.prepare_devices(devices)
 
     @property
     def noisy(self) -> bool:
         """Readings need keys."""
-        return self._setup.options.depth_noise_rate > 0 or self._setup.options.scan_noise_rate > 0
+        return self.options.depth_noise_rate > 0 or self.options.scan_noise_rate > 0
 
     @property
     def looks(self) -> bool:
         """Some sensor needs images or rays; the others are read from the view alone (`feel_fn`)."""
-        return self._camera is not None
+        return bool(self._renderers)
 
     # Readings.
 
@@ -174,7 +230,7 @@ class SensorSuite:
     def feel_fn(self, view: PhysicsView, states: ExtendedStates, controller: Any) -> Readings:
         """Readings of the sensors that need the view only. Pure on every engine, not compiled."""
         percept = Percept(view, states, controller)
-        return {s.name: self._read(s, percept) for s in self._felt}
+        return {c.name: self._read(c, percept) for c in self._felt}
 
     def look_fn(
         self,
@@ -192,12 +248,12 @@ class SensorSuite:
         Args:
           rendered: the worlds whose readings matter; None: all.
         """
-        if self._camera is None:
+        if not self._renderers:
             return {}, None
         draw = draw if draw is not None and self._varied else Draw()
-        eye, poses = self._poses(view, controller, draw)
-        images = self._camera(physics, view, states, poses, rendered, draw)
-        return self._finish(view, states, controller, eye, images, memory, keys)
+        eyes, poses = self._poses(view, controller, draw)
+        images = [renderer.camera(physics, view, states, poses, rendered, draw) for renderer in self._renderers]
+        return self._finish(view, states, controller, eyes, images, memory, keys)
 
     # Memory.
 
@@ -206,42 +262,57 @@ class SensorSuite:
         return self._remember(view, controller) if self._remembers else None
 
     def _memory(self, view: PhysicsView, controller: Any) -> Memory:
-        pos, quat = self._setup.controller.eye(view, controller)
-        return Memory(pos, quat, jnp.asarray(view.body_pos), jnp.asarray(view.body_quat))
+        cameras = {c.setup.camera_name: c.setup.camera for c in self._seen if c.sensor.remembers}
+        head = cameras.pop(HEAD, None) or next(iter(cameras.values()))
+        others = {name: camera.pose(view, controller) for name, camera in cameras.items()}
+        return Memory(*head.pose(view, controller), jnp.asarray(view.body_pos), jnp.asarray(view.body_quat), others)
 
-    def _poses_fn(self, view: PhysicsView, controller: Any, draw: Draw) -> tuple[Pose | None, dict[str, Pose]]:
-        """Of the eye, and of everything that the camera is to be called with."""
-        eye, poses = None, {}
-        if self._setup.scene.manifest.agents[self._setup.agent].camera:
-            pos, quat = self._setup.controller.eye(view, controller)
-            eye = (jnp.asarray(pos), jnp.asarray(quat))
-            if draw.camera_pos is not None and draw.camera_quat is not None:
-                eye = compose(*eye, jnp.asarray(draw.camera_pos), jnp.asarray(draw.camera_quat))
-            if any(s.images for s in self._seen):
-                poses[self._setup.camera] = eye
+    def _poses_fn(
+        self, view: PhysicsView, controller: Any, draw: Draw
+    ) -> tuple[dict[str, Pose], dict[str, Pose]]:
+        """Of all cameras that are read, by their names in observations; and of everything that renderers are to be
+        called with, by the names of the model's cameras and of patterns of rays."""
+        eyes: dict[str, Pose] = {}
+        poses: dict[str, Pose] = {}
+        for renderer in self._renderers:
+            for name, camera in renderer.views.items():
+                eyes[name] = _displaced(camera.pose(view, controller), draw)
+                if camera.placed or draw.camera_pos is not None:
+                    poses[camera.camera] = eyes[name]
+        if self._patterns and HEAD not in eyes and self._own.scene.manifest.agents[self._own.agent].camera:
+            eyes[HEAD] = _displaced(self._own.controller.eye(view, controller), draw)
         for name, (_, pose) in self._patterns.items():
-            poses[name] = pose(self._setup, view, eye)
-        return eye, poses
+            poses[name] = pose(self._own, view, eyes.get(HEAD))
+        return eyes, poses
 
     def _finish_fn(
         self,
         view: PhysicsView,
         states: ExtendedStates,
         controller: Any,
-        eye: Pose | None,
-        images: Images,
+        eyes: dict[str, Pose],
+        images: Sequence[Images],
         memory: Memory | None,
         keys: UInt32[Array, "W 2"] | None,
     ) -> tuple[Readings, Memory | None]:
         """Readings from images."""
         now = self._memory(view, controller) if self._remembers else None
-        before = now if memory is None else memory
-        percept = Percept(view, states, controller, eye, images, before, keys)
-        return {s.name: _finite(self._read(s, percept)) for s in self._seen}, now
+        before, found = now if memory is None else memory, {}
+        for channel in self._seen:
+            name = channel.setup.camera_name
+            seen = _of_camera(self._renderers, images, name)
+            own = before
+            if before is not None and name in before.others:
+                pos, quat = before.others[name]
+                own = dataclasses.replace(before, eye_pos=pos, eye_quat=quat)
+            percept = Percept(view, states, controller, eyes.get(name), seen, own, keys)
+            found[channel.name] = _finite(self._read(channel, percept))
+        return found, now
 
-    def _read(self, sensor: Sensor, percept: Percept) -> Array:
+    def _read(self, channel: Channel, percept: Percept) -> Array:
         """A reading. Raises PluginError: it has another shape or type than the sensor's space."""
-        reading, space = sensor.read(self._setup, percept), self.spaces[sensor.name]
+        sensor, space = channel.sensor, self.spaces[channel.name]
+        reading = sensor.read(channel.setup, percept)
         shape, dtype = tuple(np.shape(reading)), jnp.result_type(reading)
         if not shape or shape[1:] != tuple(space.shape) or dtype != space.dtype:
             requested = ", ".join(["W", *map(str, space.shape)])
@@ -249,6 +320,25 @@ class SensorSuite:
                 f"sensor '{sensor.name}' gives {dtype}{list(shape)}; its space is {np.dtype(space.dtype)}[{requested}]"
             )
         return reading
+
+
+def _displaced(pose: Pose, draw: Draw) -> Pose:
+    """The pose of a camera with what was drawn of the worlds' cameras."""
+    pos, quat = jnp.asarray(pose[0]), jnp.asarray(pose[1])
+    if draw.camera_pos is None or draw.camera_quat is None:
+        return pos, quat
+    return compose(pos, quat, jnp.asarray(draw.camera_pos), jnp.asarray(draw.camera_quat))
+
+
+def _of_camera(renderers: Sequence[Renderer], images: Sequence[Images], name: str) -> Images:
+    """The images of one camera, with all rays; of the first renderer where none has the camera."""
+    rays = images[0].rays
+    for renderer, made in zip(renderers, images, strict=True):
+        if name in renderer.numbers:
+            k = renderer.numbers[name]
+            one = {f: a[:, k : k + 1] for f in OF_CAMERAS if (a := getattr(made, f)) is not None}
+            return dataclasses.replace(made, rays=rays, **one)
+    return images[0]
 
 
 def _finite(reading: Array) -> Array:

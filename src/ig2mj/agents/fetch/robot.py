@@ -40,6 +40,7 @@ from ig2mj.agents.parts import (
     set_inertia,
 )
 from ig2mj.agents.task_robot import HandControl, TaskRobot
+from ig2mj.agents.wrist_cameras import RIGHT, add_wrist_camera
 from ig2mj.errors import UnknownNameError
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
@@ -65,6 +66,9 @@ FIELD_OF_VIEW = 90.0
 
 LASER = (0.30, 0.0, 0.2878)
 """m: before the shell. The maker's laser_link is at 0.235, in a slot that our shell has not, and sees 220 degrees."""
+
+WRIST_EYE, WRIST_LOOKS_AT = (-0.15, 0.0, 0.16), (0.07, 0.0, -0.01)
+"""m, gripper's frame: the gripper's camera, on top of its housing, and a point before the fingers."""
 
 
 HAND = HandControl(
@@ -137,6 +141,7 @@ class Fetch(TaskRobot):
         links["head_tilt_link"].add_camera(
             name=f"{self.name}/eye", pos=list(CAMERA), quat=[0.5, 0.5, -0.5, -0.5], fovy=FIELD_OF_VIEW
         )
+        wrist = add_wrist_camera(links["gripper_link"], self.name, RIGHT, WRIST_EYE, WRIST_LOOKS_AT, (0.0, 0.0, 1.0))
         exclude_all(spec, [body.name for body in links.values()])
         controls = [0.0, 0.0, *start[2:]]
         free = [] if self.pinned else [*map(float, pos), *map(float, quat)]
@@ -149,6 +154,7 @@ class Fetch(TaskRobot):
             hands=[f"{self.name}_gripper_link"],
             assisted=True,
             laser=LASER,
+            wrist_cameras={RIGHT: wrist},
         )
 
     def _add_link(

@@ -40,6 +40,7 @@ from ig2mj.agents.parts import (
     visual,
 )
 from ig2mj.agents.task_robot import HandControl, TaskRobot
+from ig2mj.agents.wrist_cameras import LEFT, RIGHT, add_wrist_camera
 from ig2mj.errors import UnknownNameError
 from ig2mj.looks.costume import Costume
 from ig2mj.scene.manifest import AgentEntry
@@ -68,6 +69,9 @@ FIELD_OF_VIEW = 120.0
 
 LASER = (0.07, 0.0, -0.25)
 """m: before the column, 0.3 m above the floor while the body stands; iGibson's humanoid has no scanner."""
+
+WRIST_EYE, WRIST_LOOKS_AT = (0.0, 0.10, 0.11), (0.0, -0.11, 0.02)
+"""m, right hand's frame: the hand's camera under the wrist, and a point before the palm."""
 
 
 def _control(hand: str) -> HandControl:
@@ -142,6 +146,10 @@ class Humanoid(TaskRobot):
             )
             for number, hand in enumerate(HANDS)
         ]
+        wrists = {
+            wrist: add_wrist_camera(spec.body(hands[number].palm), self.name, wrist, *_wrist_view(number))
+            for number, wrist in enumerate((LEFT, RIGHT))
+        }
         for parts in hands:
             exclude_all(spec, [parts.palm, *parts.links])
             for part in (parts.palm, *parts.links):
@@ -162,6 +170,7 @@ class Humanoid(TaskRobot):
             no_contact={self.name: list(NO_CONTACT)},
             assisted=True,
             laser=LASER,
+            wrist_cameras=wrists,
         )
 
     def hand_rays(self) -> tuple[HandRays, ...]:
@@ -187,6 +196,11 @@ class Humanoid(TaskRobot):
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> HumanoidController:
         return HumanoidController(tables, agent, period, self.grasp_flags)
+
+
+def _wrist_view(hand: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of a hand's camera: where it is, what it looks at and what is up, in the hand's frame; on the palm's side."""
+    return mirrored(hand, WRIST_EYE), mirrored(hand, WRIST_LOOKS_AT), np.array([0.0, 0.0, -1.0])
 
 
 def _draw_body(body: mujoco.MjsBody, shell: str, dark: str, accent: str) -> None:

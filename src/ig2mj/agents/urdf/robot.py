@@ -45,6 +45,8 @@ from ig2mj.agents.urdf.description import Description
 from ig2mj.agents.urdf.grip import hand_rays, with_closed_limits
 from ig2mj.agents.urdf.layout import OMNIDIRECTIONAL, Layout
 from ig2mj.agents.urdf.layout_file import read_entries
+from ig2mj.agents.urdf.wrists import wrist_views
+from ig2mj.agents.wrist_cameras import add_wrist_camera
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
 
@@ -209,7 +211,16 @@ class UrdfRobot(TaskRobot):
             hands=[bodies[link].name for link in self.holding],
             assisted=len(self.hand_rays()) > 0,
             laser=laser,
+            wrist_cameras=self._add_wrist_cameras(bodies),
         )
+
+    def _add_wrist_cameras(self, bodies: Mapping[str, mujoco.MjsBody]) -> dict[str, str]:
+        """On the hands farthest to the right and to the left at the start; on a single one, the right camera."""
+        views = wrist_views(self.body, self.layout, self.holding, self.name)
+        return {
+            wrist: add_wrist_camera(bodies[view.link], self.name, wrist, view.eye, view.at, view.up)
+            for wrist, view in views.items()
+        }
 
     @property
     def holding(self) -> tuple[str, ...]:
