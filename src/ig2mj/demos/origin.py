@@ -21,6 +21,7 @@ import jax
 import mujoco
 import numpy as np
 
+from ig2mj.agents.wrist_cameras import is_wrist_camera
 from ig2mj.demos.model_hash import appearance_hash, physics_hash, whole_hash
 from ig2mj.demos.task_hash import task_hash, whole_task_hash
 from ig2mj.demos.writer import FORMAT_VERSION

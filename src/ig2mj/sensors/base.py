@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -83,7 +83,7 @@ class SensorOptions:
     shadows: bool = False
     rows: tuple[int, int] | None = None
     looks: str = CAMERA_LOOKS
-    cameras: Mapping[str, tuple[int, int]] = dataclasses.field(default_factory=dict, hash=False)
+    cameras: Mapping[str, int | Sequence[int]] = dataclasses.field(default_factory=dict, hash=False)
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> SensorOptions:
@@ -117,7 +117,7 @@ class SensorOptions:
 
     def of_camera(self, name: str) -> SensorOptions:
         """With `width` and `height` of a camera's images, and `rows` where they are its rows."""
-        width, height = self.cameras.get(name, (self.width, self.height))
+        width, height = _size(name, self.cameras.get(name, (self.width, self.height)))
         return dataclasses.replace(self, width=width, height=height, rows=self.rows if name == HEAD else None)
 
 

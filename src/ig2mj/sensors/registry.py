@@ -47,8 +47,8 @@ SENSORS: Registry[Sensor] = Registry("sensor", "an ig2mj.sensors.Sensor", lambda
 
 def sensor_named(observation: str) -> Sensor | None:
     """The sensor of an observation's name, with or without a camera's name before it; None: it is of none."""
-    camera, name = split_name(observation)
-    sensor = SENSORS[name] if name in SENSORS else None
+    _, name = split_name(observation)
+    sensor = SENSORS.get(name)
     return sensor if sensor is None or observation == name or sensor.images else None
 
 

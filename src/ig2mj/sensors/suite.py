@@ -106,7 +106,7 @@ class SensorSuite:
         self.options = options or SensorOptions()
         given = (names,) if isinstance(names, str) else names
         self._channels = [self._channel(name, scene, model, controller, agent) for name in given]
-        self._own = Setup(scene, model, controller, self.options, agent)
+        self._setup = Setup(scene, model, controller, self.options, agent)
         self.spaces: dict[str, Space] = {c.name: c.sensor.space(c.setup) for c in self._channels}
         self._varied = frozenset(varied) & {"lights", "camera"}
         self._felt = [c for c in self._channels if not c.sensor.looks]
@@ -117,7 +117,7 @@ class SensorSuite:
                 pattern = channel.sensor.rays(channel.setup)
                 self._patterns[pattern.name] = (pattern, channel.sensor.ray_pose)
         if "scan" in self._patterns:
-            _ = self._own.laser  # raises where there is none
+            _ = self._setup.laser  # raises where there is none
         self._renderers = self._make_renderers(engine) if self._seen else []
         self._remembers = any(c.sensor.remembers for c in self._seen)
         self._poses, self._finish = engine.compile(self._poses_fn), engine.compile(self._finish_fn)
@@ -139,7 +139,7 @@ class SensorSuite:
             raise EngineError(
                 f"the {engine.name} engine neither renders images nor casts rays (take 'native' or 'warp')"
             )
-        own = self._own
+        own = self._setup
         check_cameras([c.name for c in self._seen], self.options.cameras, own.scene, own.controller, own.agent)
         sizes: dict[tuple[Any, ...], list[Channel]] = {}
         for channel in self._seen:
@@ -169,7 +169,7 @@ class SensorSuite:
         views = {c.setup.camera_name: c.setup.camera for c in channels}
         module, kind = CAMERAS[engine.renderer].split(":")
         cameras = list(dict.fromkeys(view.camera for view in views.values()))
-        made = getattr(importlib.import_module(module), kind)(engine, self._own.model, cameras, **settings)
+        made = getattr(importlib.import_module(module), kind)(engine, self._setup.model, cameras, **settings)
         return Renderer(made, {name: cameras.index(view.camera) for name, view in views.items()}, views)
 
     def prepare_devices(self, devices: Sequence[Any]) -> None:
@@ -267,9 +267,7 @@ class SensorSuite:
         others = {name: camera.pose(view, controller) for name, camera in cameras.items()}
         return Memory(*head.pose(view, controller), jnp.asarray(view.body_pos), jnp.asarray(view.body_quat), others)
 
-    def _poses_fn(
-        self, view: PhysicsView, controller: Any, draw: Draw
-    ) -> tuple[dict[str, Pose], dict[str, Pose]]:
+    def _poses_fn(self, view: PhysicsView, controller: Any, draw: Draw) -> tuple[dict[str, Pose], dict[str, Pose]]:
         """Of all cameras that are read, by their names in observations; and of everything that renderers are to be
         called with, by the names of the model's cameras and of patterns of rays."""
         eyes: dict[str, Pose] = {}
@@ -279,10 +277,10 @@ class SensorSuite:
                 eyes[name] = _displaced(camera.pose(view, controller), draw)
                 if camera.placed or draw.camera_pos is not None:
                     poses[camera.camera] = eyes[name]
-        if self._patterns and HEAD not in eyes and self._own.scene.manifest.agents[self._own.agent].camera:
-            eyes[HEAD] = _displaced(self._own.controller.eye(view, controller), draw)
+        if self._patterns and HEAD not in eyes and self._setup.scene.manifest.agents[self._setup.agent].camera:
+            eyes[HEAD] = _displaced(self._setup.controller.eye(view, controller), draw)
         for name, (_, pose) in self._patterns.items():
-            poses[name] = pose(self._own, view, eyes.get(HEAD))
+            poses[name] = pose(self._setup, view, eyes.get(HEAD))
         return eyes, poses
 
     def _finish_fn(
