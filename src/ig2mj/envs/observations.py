@@ -21,12 +21,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt
 
+from ig2mj.agents.base import Controller
 from ig2mj.engine.view import Array
 from ig2mj.envs.state import StepContext
 from ig2mj.errors import PluginError, UnknownNameError
 from ig2mj.predicates.compile import GoalStatus
-from ig2mj.sensors.base import Memory, Space
-from ig2mj.sensors.cameras import split_name
+from ig2mj.scene.scene import Scene
+from ig2mj.sensors.base import Memory, SensorOptions, Space
+from ig2mj.sensors.cameras import check_cameras, split_name
 from ig2mj.sensors.noise import noisy
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
@@ -40,12 +42,17 @@ from ig2mj.worlds.randomize import SensorNoise
 __all__ = ["Observer", "Space", "check_names"]
 
 
-def check_names(names: Sequence[str], objective: Objective) -> list[str]:
+def check_names(
+    names: Sequence[str], objective: Objective, settings: SensorOptions, scene: Scene, controller: Controller
+) -> list[str]:
     """The sensors among the names of observations.
 
+    Args:
+      settings: of the sensors. controller: of the agent, the first of the scene.
+
     Raises:
-      UnknownNameError: there is no such observation; with near matches. PluginError: a sensor of a plug-in has the name
-        of an observation of the task.
+      UnknownNameError: there is no such observation or camera; with near matches. EngineError: the robot has no such
+        camera. PluginError: a sensor of a plug-in has the name of an observation of the task.
     """
     known = (*objective.vectors, *SENSORS)  # without cameras' names
     added = SENSORS.sources()
@@ -57,7 +64,9 @@ def check_names(names: Sequence[str], objective: Objective) -> list[str]:
         if name not in known and (sensor == name or sensor not in SENSORS):
             prefix = name.removesuffix(sensor)
             raise UnknownNameError("observation", name, known if not prefix else [f"{prefix}{one}" for one in SENSORS])
-    return [name for name in names if name not in objective.vectors]
+    found = [name for name in names if name not in objective.vectors]
+    check_cameras(found, settings.cameras, scene, controller)
+    return found
 
 
 class Observer:

@@ -32,7 +32,6 @@ from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, EnvSetup, setup_activity, setup_bddl, setup_navigation
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
-from ig2mj.sensors.cameras import check_cameras
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.added_objects import object_texts, with_objects
@@ -264,8 +263,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     scene, rules, controllers = setup.scene, setup.rules, setup.controllers
     objective = _with_functions(setup, task, config, observations)
     names = tuple(one if isinstance(one, str) else one.__name__ for one in observations)
-    known = check_names(names, objective)
-    check_cameras(known, settings.cameras, scene, controllers[0])
+    known = check_names(names, objective, settings, scene, controllers[0])
     starts = setup.pool()  # may take minutes: everything that has a name is known by now
     rows = starts.size
     if config.augment_starts and isinstance(task, Task):
