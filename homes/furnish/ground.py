@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..plans.building import stair_boxes
-from ..plans.layout_maps import HIGH, LOW, reachable
+from ..plans.layout_maps import HIGH, LOW, reachable_and_cut_off
 from ..plans.plan import Plan, Rect
 from .arrangement import FLAT
 from .placed import Placed
@@ -16,12 +16,16 @@ RADIUS = 0.34
 LEAST_SHARE = 0.12
 """Of a room's floor that the robot's middle must be able to stand on, or LEAST_AREA (m2) in a tiny room."""
 LEAST_AREA = 0.04
+LARGEST_POCKET = 0.25
+"""m2 on which the robot's middle could stand but cannot get to, at most, where open doors count."""
 
 
 class Ground:
     """Free floor of a plan at `CELL`; row is y, column is x, the world's origin in the middle."""
 
-    def __init__(self, plan: Plan):
+    def __init__(self, plan: Plan, leaves: np.ndarray | None = None):
+        """`leaves`: [n, 2, 3] boxes of doors that stand open, m; then the front door must be reached, too, and no large
+        part of a room may be cut off. None: open doors do not count."""
         x0, y0, x1, y1 = plan.extent()
         self._half = int(np.ceil((max(-x0, -y0, x1, y1) + 0.5) / CELL))
         self.free = np.zeros((2 * self._half, 2 * self._half), bool)
@@ -35,7 +39,12 @@ class Ground:
             self._area[room.name] = self.free[cells].size * CELL**2
         for low, high in stair_boxes(plan):
             self.free[self._outer_cells((low[0], low[1], high[0], high[1]))] = False
+        self._pockets = np.inf if leaves is None else LARGEST_POCKET
         for opening in plan.openings:
+            if opening.walkable and opening.edge.outer and leaves is not None:
+                inwards = (1.0 if opening.edge.before is None else -1.0) * (opening.edge.thickness / 2 + RADIUS + CELL)
+                x, y = opening.edge.point(opening.centre, inwards)
+                self._gates[self._cell(y), self._cell(x)] = "the front door"
             if not opening.walkable or opening.edge.outer:
                 continue
             post = 0.04 if opening.kind == "door" else 0.0
@@ -45,6 +54,8 @@ class Ground:
             self.free[self._inner_cells((p[0], p[1], q[0], q[1]))] = True
             x, y = opening.edge.point(opening.centre)
             self._gates[self._cell(y), self._cell(x)] = f"the way between {' and '.join(opening.edge.rooms)}"
+        if leaves is not None:
+            self.free = self._less(leaves)
 
     def allows(self, thing: Placed) -> bool:
         """Whether every room and doorway can still be reached with this object in its place."""
@@ -79,7 +90,7 @@ class Ground:
         return after
 
     def _unreachable(self, free: np.ndarray) -> str:
-        reach = reachable(free, RADIUS, CELL)
+        reach, pocket = reachable_and_cut_off(free, RADIUS, CELL)
         for gate, name in self._gates.items():
             if not reach[gate]:
                 return name
@@ -87,6 +98,8 @@ class Ground:
             need = max(LEAST_AREA, min(LEAST_SHARE * self._area[name], 1.2))
             if reach[cells].sum() * CELL**2 < need:
                 return name
+            if pocket[cells].sum() * CELL**2 > self._pockets:
+                return f"a part of {name}"
         return ""
 
     def _cell(self, v: float) -> int:

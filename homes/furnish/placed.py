@@ -12,7 +12,7 @@ import numpy as np
 from ..objects.catalogue import build_model, find
 from ..objects.model import HouseholdObject
 from ..objects.stable_poses import stable_orientations
-from ..shapes.sweeps import Hull, face_normals, swept
+from ..shapes.sweeps import Hull, face_normals, opened, swept
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -126,6 +126,11 @@ class Placed:
         """[2, 3] world box of all of it."""
         boxes = self.boxes()
         return np.array([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+
+    def open_boxes(self) -> np.ndarray:
+        """[n, 2, 3] world boxes of the hulls of its doors, lids and drawers where they are wide open."""
+        hulls = [self.world(points) for points in opened(self.shape.model)]
+        return np.array([[p.min(0), p.max(0)] for p in hulls]).reshape(-1, 2, 3)
 
     def parts(self) -> list[Hull]:
         """Its hulls in the world, with their normals."""

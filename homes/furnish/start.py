@@ -41,12 +41,14 @@ def start_home(
             raise NoRoomToOpen(plan, opening, problem)
         thing.name = things.name(thing.category)
         things.put(thing)
+    leaves = [thing.open_boxes() for thing in things.things.values() if thing.category == "door"]
     for opening in plan.openings:
         if opening.walkable and not plan.fully_open(opening.edge):
             edge = opening.edge
             p, q = edge.point(opening.low, -WAY_DEPTH), edge.point(opening.high, WAY_DEPTH)
             things.keep_free(WAY, np.array([[[p[0], p[1], 0.02], [q[0], q[1], 2.0]]]))
-    return HomeInProgress(plan, things, Ground(plan), rng, models=models, limit=limit, seed=seed)
+    ground = Ground(plan, np.concatenate(leaves) if plan.leaves_at_walls and leaves else None)
+    return HomeInProgress(plan, things, ground, rng, models=models, limit=limit, seed=seed)
 
 
 def lay_doormat(home: HomeInProgress) -> Placed | None:

@@ -84,9 +84,15 @@ def reachable(free: np.ndarray, radius: float, resolution: float) -> np.ndarray:
     Args:
       free: [n, n] bool. radius: m. resolution: m per cell.
     """
+    return reachable_and_cut_off(free, radius, resolution)[0]
+
+
+def reachable_and_cut_off(free: np.ndarray, radius: float, resolution: float) -> tuple[np.ndarray, np.ndarray]:
+    """As `reachable`; and where the disc's middle can stand, but not get to."""
     distance = np.asarray(ndimage.distance_transform_edt(np.pad(free, 1)))[1:-1, 1:-1]
     stands = distance * resolution >= radius
     labels, count = ndimage.label(stands)  # pyright: ignore[reportGeneralTypeIssues]
     if count == 0:
-        return stands
-    return labels == 1 + int(np.argmax(np.bincount(labels.ravel())[1:]))
+        return stands, stands
+    reach = labels == 1 + int(np.argmax(np.bincount(labels.ravel())[1:]))
+    return reach, stands & ~reach

@@ -37,6 +37,7 @@ def make_plan(
     front: str | None = None,
     models: int = 3,
     seed: int = 0,
+    leaves_at_walls: bool = False,
 ) -> Plan:
     """A plan with openings.
 
@@ -44,8 +45,9 @@ def make_plan(
       open_plan: pairs of rooms with no wall between them. passages: pairs with a wide opening without a door.
       front: the room with the front door; None: the best hub at an outer wall.
       models: at most so many models of doors and windows are used. seed: of the models.
+      leaves_at_walls: see `Plan`.
     """
-    plan = Plan(name, rooms, make_edges(rooms))
+    plan = Plan(name, rooms, make_edges(rooms), leaves_at_walls=leaves_at_walls)
     openings: list[Opening] = []
     for pairs, full in ((open_plan, True), (passages, False)):
         for a, b in pairs:
@@ -107,7 +109,7 @@ def doors(plan: Plan, openings: Collection[Opening], style: int, rng: random.Ran
     for edge in candidates:
         a, b = edge.rooms
         if _root(joined, a) != _root(joined, b):
-            found.append(_door(edge, style, opens_into(plan, edge), rng, seed))
+            found.append(_door(plan, edge, style, opens_into(plan, edge), rng, seed))
             _join(joined, a, b)
     return found
 
@@ -122,7 +124,7 @@ def front_doors(
         outer, key=lambda e: (("lobby", "corridor", "living_room", "kitchen").index(kinds[e.rooms[0]])
                               if kinds[e.rooms[0]] in ("lobby", "corridor", "living_room", "kitchen") else 9,
                               e.length))  # fmt: skip
-    return [_door(edge, (style + 1) % models, edge.rooms[0], rng, seed) for edge in entrances[:1]]
+    return [_door(plan, edge, (style + 1) % models, edge.rooms[0], rng, seed) for edge in entrances[:1]]
 
 
 def windows(plan: Plan, openings: Collection[Opening], pane: int, seed: int = 0) -> list[Opening]:
@@ -185,11 +187,19 @@ def opens_into(plan: Plan, edge: Edge) -> str:
     return min(a, b, key=rank).name
 
 
-def _door(edge: Edge, index: int, into: str, rng: random.Random, seed: int) -> Opening:
+def _door(plan: Plan, edge: Edge, index: int, into: str, rng: random.Random, seed: int) -> Opening:
     width = float(shape("door", index, seed).size[1]) + AIR
     low, high = edge.low + CORNER + width / 2, edge.high - CORNER - width / 2
     centre = rng.choice((low, high)) if high > low else (low + high) / 2
+    if plan.leaves_at_walls and high > low:
+        centre = high if _hinged_at_high_end(edge, index, into, seed) else low
     return door(edge, index, into, centre, seed)
+
+
+def _hinged_at_high_end(edge: Edge, index: int, into: str, seed: int) -> bool:
+    """Whether a door's hinge is on the side of larger coordinates along the edge."""
+    left = next(joint.axis[2] for joint in shape("door", index, seed).model.joints) > 0  # the hinge is at its +y edge
+    return left == ((into == edge.after) == (edge.axis == "y"))
 
 
 def _windows(plan: Plan, room: Room, edges: list[Edge], index: int, taken: list[Opening], seed: int) -> list[Opening]:

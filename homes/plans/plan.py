@@ -116,12 +116,17 @@ class Opening:
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """A home's rooms, wall edges and openings. name: of the home."""
+    """A home's rooms, wall edges and openings. name: of the home.
+
+    Attributes:
+      leaves_at_walls: doors are hinged near corners, and furniture leaves ways past doors that stand open.
+    """
 
     name: str
     rooms: tuple[Room, ...]
     edges: tuple[Edge, ...]
     openings: tuple[Opening, ...] = ()
+    leaves_at_walls: bool = False
 
     def room(self, name: str) -> Room:
         return next(room for room in self.rooms if room.name == name)

@@ -61,6 +61,22 @@ def sweep(model: HouseholdObject, joint: Joint) -> list[Hull]:
     return [(cloud, face_normals(cloud)) for cloud in clouds]
 
 
+def opened(model: HouseholdObject) -> list[np.ndarray]:
+    """Hulls [n, 3] of the parts on joints that open, each at the end of its range, the others at 0; base frame."""
+    links = {link.name: link for link in model.links}
+    found = []
+    for joint in model.joints:
+        if not joint.openable or joint.kind not in ("revolute", "prismatic"):
+            continue
+        origin, axis, by = links[joint.child].origin, np.array(joint.axis) / np.linalg.norm(joint.axis), joint.limits[1]
+        for name in carried(model, joint):
+            for points in links[name].hulls:
+                points = points + links[name].origin
+                turned = (points - origin) @ turn(axis, by).T + origin
+                found.append(turned if joint.kind == "revolute" else points + by * axis)
+    return found
+
+
 def _arcs(points: np.ndarray, axis: np.ndarray, low: float, high: float) -> list[np.ndarray]:
     """Point clouds around `points` [n, 3] on their way about an axis through the origin, one per step."""
     along = np.outer(points @ axis, axis)

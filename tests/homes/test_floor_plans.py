@@ -14,7 +14,7 @@ from ig2mj_homes.plans.layout_maps import reachable
 from ig2mj_homes.plans.openings import opening_things
 from ig2mj_homes.plans.plan import HEIGHT, Plan, grid_rooms, make_edges
 from ig2mj_homes.plans.porch import front_door, porch_rails, porch_slab
-from ig2mj_homes.plans.shipped import DRAWINGS, plan
+from ig2mj_homes.plans.shipped import DRAWINGS, LEAVES_AT_WALLS, plan
 
 cached_plan = functools.cache(plan)
 each_home = pytest.mark.parametrize("name", sorted(DRAWINGS))
@@ -98,6 +98,22 @@ def test_a_door_or_window_fills_its_opening_and_names_the_rooms_on_both_sides(na
         assert opening.bottom <= low[2] and high[2] <= opening.top
         assert thing.fixed and thing.rooms == opening.edge.rooms
         assert len(thing.rooms) == (1 if opening.edge.outer else 2)
+
+
+@pytest.mark.parametrize("name", LEAVES_AT_WALLS)
+def test_open_doors_and_the_front_door_leave_a_way_to_every_room_of_the_empty_home(name: str):
+    home = cached_plan(name)
+    doors = [thing for opening, thing in opening_things(home) if opening.kind == "door"]
+    ground = Ground(home, np.concatenate([door.open_boxes() for door in doors]))
+    assert ground.free.sum() < Ground(home).free.sum()
+    assert ground.cut_off_by(np.zeros((0, 2, 3))) == ""
+
+
+def test_a_door_left_open_across_a_corridor_cuts_a_room_off():
+    home = cached_plan("alder")
+    corridor = home.inside(home.room("corridor_0"))
+    leaf = np.array([[[0.0, corridor[1], 0.0], [0.05, corridor[3], 2.0]]])
+    assert Ground(home, leaf).cut_off_by(np.zeros((0, 2, 3))) != ""
 
 
 @each_home

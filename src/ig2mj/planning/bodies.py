@@ -237,7 +237,7 @@ class HoveringBody(_Body):
         return move, turn
 
 
-SPARE_REACH, CARRY = 0.08, (0.34, 0.16, 0.5)
+SPARE_REACH, CARRY = 0.05, (0.34, 0.16, 0.5)
 """m that are left of an arm's reach; forwards, to the side and up: where a hand carries what it holds, above tables."""
 
 SPEED_OF_BASE = 0.05

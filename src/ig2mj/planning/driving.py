@@ -30,6 +30,10 @@ STEP = 0.1
 """m between stances at which what is held is checked."""
 
 
+AT_LEAST, SLOWEST = 100, 0.02
+"""Agent steps that a stretch of the way may take at least, and m in an agent step of the slowest base: its limit."""
+
+
 def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     """Drives to a stance; returns the reason why it did not get there."""
     here, yaw = world.base
@@ -101,7 +105,11 @@ def _between(start: Stance, end: Stance) -> list[Stance]:
 
 def drive(points: np.ndarray, yaw: float | None) -> Program:
     """The program that follows a way, and at its end turns."""
-    program = [Phase(Base.DRIVE, xy=(float(x), float(y)), tolerance=0.08) for x, y in points[1:]]
+    apart = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    program = [
+        Phase(Base.DRIVE, xy=(float(x), float(y)), tolerance=0.08, limit=AT_LEAST + int(length / SLOWEST))
+        for (x, y), length in zip(points[1:], apart, strict=True)
+    ]
     if program:
         program[-1] = dataclasses.replace(program[-1], tolerance=0.025)
     if yaw is not None:

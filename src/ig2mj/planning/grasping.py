@@ -8,6 +8,7 @@ import numpy as np
 
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasps import GraspPose, grasp_poses, ordered
+from ig2mj.planning.motion_planner import NEAR_START, FreeFloor
 from ig2mj.planning.moves import (
     ATTEMPTS,
     BELOW,
@@ -34,6 +35,10 @@ LIFT = 0.03
 
 POSES, WAYS = 6, 40
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
+
+
+NEAREST = 200
+"""Cells of the floor that are compared to find the edge of an object that is nearest to it."""
 
 
 def grasp(world: PlannedWorld, step: Step) -> Primitive:
@@ -116,7 +121,7 @@ def _plan(world: PlannedWorld, name: str, hand: int, tried: Sequence[GraspPose])
     points = np.array([p.point for p in poses])
 
     def candidates() -> Iterator[tuple[Stance, GraspPose]]:
-        for point in (world.com(name), *points[_spread(points, world.com(name))]):
+        for point in (world.com(name), *points[_spread(points, world.com(name))], _nearest(world, floor, points)):
             for stance in world.stances(hand, point, floor, AWAY):
                 near = [p for p in ordered(poses, stance.yaw) if world.reaches(hand, stance, p.at(p.before))]
                 yield from ((stance, pose) for pose in near[:POSES])
@@ -142,6 +147,16 @@ def _spread(points: np.ndarray, centre: Vector) -> list[int]:
         if all(np.linalg.norm(points[k, :2] - points[f, :2]) > 0.25 for f in found):
             found.append(int(k))
     return found
+
+
+def _nearest(world: PlannedWorld, floor: FreeFloor, points: np.ndarray) -> Vector:
+    """The point that is nearest to floor to which the robot can drive: the edge of what lies far from it."""
+    here, _ = world.base
+    middles = floor.occupancy.middles(np.argwhere(np.isfinite(floor.distances(here, NEAR_START))))
+    if not len(middles):
+        return points[0]
+    near = middles[np.argsort(np.linalg.norm(middles - points[0][:2], axis=1))[:NEAREST]]
+    return points[int(np.argmin(np.linalg.norm(points[:, None, :2] - near[None], axis=-1).min(1)))]
 
 
 def release(world: PlannedWorld, step: Step) -> Primitive:

@@ -44,6 +44,11 @@ carried."""
 APART = 0.12
 """m between stances for the same point, at least."""
 
+SIDEWAYS = 0.4
+"""Cost of standing with a hand's side to a point. The hand's shoulder, the middle of the sphere that bounds its reach
+(iGibson's behavior_robot.py), is behind the body's axis and to the side, so that the hand reaches 0.3 m farther than
+ahead."""
+
 RESTING = (0.56, 0.8, 0.33)
 """m: heights of the hands at rest, and how far from the body's axis they reach."""
 
@@ -337,14 +342,18 @@ class PlannedWorld:
             grasp point, m, in the body's frame.
         """
         here, _ = self.base
-        cells = floor.within(point[:2], self.body.reach)
+        side = self.body.carry[hand][1]
+        cells = floor.within(point[:2], self.body.reach + abs(float(self.body.shoulders[hand][1])))
         middles = floor.occupancy.middles(cells)
         offset = point[:2] - middles
         apart = np.linalg.norm(offset, axis=1)
-        side = self.body.carry[hand][1] * 0.6
-        yaw = np.arctan2(offset[:, 1], offset[:, 0]) - np.arctan2(side, np.maximum(apart, 0.3))
+        bearing = np.arctan2(offset[:, 1], offset[:, 0])
+        yaw = np.concatenate(
+            [bearing - np.arctan2(0.6 * side, np.maximum(apart, 0.3)), bearing - np.sign(side) * np.pi / 2]
+        )
         way = floor.distances(here, NEAR_START)[tuple(cells.T)]
         cost = 0.6 * way + 2.0 * np.abs(apart - away) - 0.5 * np.minimum(floor.spare[tuple(cells.T)], 0.2)
+        cost, middles = np.concatenate([cost, cost + SIDEWAYS]), np.concatenate([middles, middles])
         target = point if held is None else point + _turned_vectors(yaw, held)
         cost[~self._reach_from(hand, middles, yaw, target)] = np.inf
         count, obstacles = 0, self.obstacles()

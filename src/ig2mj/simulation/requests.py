@@ -24,6 +24,8 @@ from ig2mj.envs.planning_stage import DOORS_SETTLE
 from ig2mj.errors import AbilityError, StateError
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
+from ig2mj.planning.kinematic import SETTLE, KinematicRung, KinematicStage
+from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.requests import KIT, MEASURED, Request, RequestSource
 from ig2mj.planning.rung import Rung
@@ -41,7 +43,7 @@ from ig2mj.scene.scene import load_scene
 from ig2mj.simulation.robots import put_row
 from ig2mj.simulation.simulation import Simulation
 
-RUNGS = ("symbolic", "physics")
+RUNGS = ("symbolic", "kinematic", "physics")
 """Rungs that can be measured."""
 
 DRAWS, WORK = 20, 400
@@ -122,12 +124,16 @@ class RequestBench:
         wholes = np.flatnonzero(bare.tables.object_part_of < 0)
         kit = [name for o in wholes if (name := bare.tables.object_names[o]) not in own]
         self._source = RequestSource(self._domain, kit)
-        self._simulation = None
+        self._simulation, self._stage = None, None
+        if rung == "symbolic":
+            return
+        x, y = start_place(bare, self._sampler.query.view, ())
+        scene = load_scene(home, agents=[body.at(x, y, 0.0)], objects=KIT)
+        self._query = SceneQuery(scene)
         if rung == "physics":
-            x, y = start_place(bare, self._sampler.query.view, ())
-            scene = load_scene(home, agents=[body.at(x, y, 0.0)], objects=KIT)
             self._simulation = Simulation(scene, seed=seed, grasping="assisted")
-            self._query = SceneQuery(scene)
+        else:
+            self._stage, self._planner = KinematicStage(scene), MotionPlanner(scene)
 
     def run(self, primitive: str, number: int) -> dict[str, Any]:
         """Draws a request and carries it out; see the module's text."""
@@ -141,7 +147,7 @@ class RequestBench:
         if row is None:
             return {**found, "detail": why}
         solution = self._carried_out(self._symbolic(row, number), request)
-        rung = self._symbolic(row, number) if self._simulation is None else self._physics(row, request.step, number)
+        rung = self._rung(row, request.step, number)
         for name in request.taken:
             taken = _outcome(rung, Step("grasp", (name,)))
             if not taken.done:
@@ -180,12 +186,28 @@ class RequestBench:
             return None, str(e)
         return row, ", ".join(f"{reason} ({count})" for reason, count in rejected.most_common(2))
 
+    def _rung(self, row: Row, step: Step, number: int) -> Rung:
+        """What is measured, in a state."""
+        if self._simulation is not None:
+            return self._physics(self._simulation, row, step, number)
+        return self._symbolic(row, number) if self._stage is None else self._kinematic(self._stage, row, step, number)
+
     def _symbolic(self, row: Row, number: int) -> SymbolicRung:
         return SymbolicRung(self._domain, self._sampler, [(row.physics, row.states)], self._seed, number)
 
-    def _physics(self, row: Row, step: Step, number: int) -> PhysicsRung:
-        simulation = self._simulation
-        assert simulation is not None
+    def _kinematic(self, stage: KinematicStage, row: Row, step: Step, number: int) -> KinematicRung:
+        query, physics = self._sampler.query, row.physics
+        write = open_doors(self._sampler.query.scene, step.arguments)
+        if write is not None:
+            query.load(physics)
+            query.write(write)
+            query.settle(SETTLE)
+            physics = query.save()
+        start = [(physics, row.states)]
+        options = {"query": self._query, "planner": self._planner}
+        return KinematicRung(self._domain, stage, self._sampler, start, self._seed, number, **options)
+
+    def _physics(self, simulation: Simulation, row: Row, step: Step, number: int) -> PhysicsRung:
         simulation.reset()
         put_row(simulation, row)
         write = open_doors(simulation.scene, step.arguments)
