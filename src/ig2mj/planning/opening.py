@@ -7,7 +7,9 @@ from collections.abc import Callable, Generator
 
 import numpy as np
 
+from ig2mj.planning.clearance import hand_way
 from ig2mj.planning.driving import go
+from ig2mj.planning.grasps import AT_OBJECT
 from ig2mj.planning.joints import AJAR, OPEN_TO, FaceGrip, OpenableJoint, openable_joints
 from ig2mj.planning.moves import (
     ABOVE,
@@ -36,11 +38,17 @@ AWAY = 0.7
 PUSH_IN, PRESS = 0.03, 0.004
 """m behind a face that a hand goes for which takes hold of it, and which pushes it shut."""
 
+OFF = (0.0, 0.1, 0.2)
+"""m that a hand goes off a link that it has moved, before it goes back to where it rests."""
+
 SHUT, MOVED = 0.01, 0.05
 """Share of a joint's range up to which it counts as shut, and change of it after which the same way is tried again."""
 
 LAST = 0.1
 """Share of a joint's range to which a hand on the edge of a door pulls it shut; it is pushed from there."""
+
+UPRIGHT = 0.5
+"""Horizontal part of the normal of a face from which on the robot stands in front of it: not of a lid's."""
 
 STANCES, WAYS = 20, 12
 """Stances for each grip, and ways of a hand that are looked for with one kind of grip, at most."""
@@ -116,8 +124,25 @@ def move_joint(
     if program is None:
         return "no_path", f"the hand has no way to {joint.name}"
     reason = yield program
-    yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=6, after=""), *rest(hand)]
+    yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=6, after="")]
+    yield withdraw(world, hand)
     return reason or "not_true_after", f"{joint.name} did not move far enough"
+
+
+def withdraw(world: PlannedWorld, hand: int) -> Program:
+    """The empty hand goes back to where it rests, around what it has moved: else it lifts a light box by its open lid.
+
+    Where the hand touches the link, it first goes straight off it.
+    """
+    fingers, palm = world.hand_axes(hand)
+    spheres, obstacles = world.spheres(fingers, palm) * (1.0, 1.0, 1.0, AT_OBJECT), world.obstacles()
+    start, end = world.grip(hand), world.resting(hand, world.stance)
+    for off in (-palm, -ahead(world.stance.yaw), UP, -fingers):
+        for apart in OFF:
+            way = hand_way(obstacles, spheres, start + apart * off, end)
+            if way is not None:
+                return [*travel(hand, [start + apart * off, *way], None), *rest(hand)]
+    return rest(hand)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -155,7 +180,8 @@ def _plan(world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tri
             places = joint.path(grip, fraction)
             first, normal = places[0]
             for stance in world.stances(hand, places[len(places) // 2][0], floor, AWAY, most=STANCES):
-                if grips is not joint.edges and (np.array([*stance.xy, first[2]]) - first) @ normal <= 0.0:
+                upright = grips is not joint.edges and float(np.linalg.norm(normal[:2])) > UPRIGHT
+                if upright and (np.array(stance.xy) - first[:2]) @ normal[:2] <= 0.0:
                     continue  # the robot stands behind the face
                 if np.linalg.norm(sweep - np.array(stance.xy), axis=1).min() < STAND_OFF:
                     continue
@@ -216,4 +242,4 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
             Phase(hand=hand, close=False, until=Until.EMPTY, limit=10, after=""),
         ]  # fmt: skip
     program.append(Phase(hand=hand, pos=vector3(places[-1][0] + RETREAT * places[-1][1]), limit=12, after=""))
-    return [*program, *rest(hand), Phase(until=Until.WAITED, limit=4)]
+    return program

@@ -31,7 +31,7 @@ def test_a_fixed_car_plays_the_one_on_the_garages_floor_and_is_not_placed():
 
 
 def test_what_lies_on_something_is_loose():
-    binding = bound_in("poplar", "cleaning_bedroom")
+    binding = bound_in("willow", "cleaning_bedroom")
     assert binding.objects["painting.n.01_1"] in binding.added, "those of the home hang on its walls"
 
 
