@@ -26,6 +26,7 @@ from ig2mj.predicates.definitions.on_floor import ON_FLOOR
 from ig2mj.predicates.definitions.on_top import ON_TOP
 from ig2mj.predicates.definitions.open import OPEN
 from ig2mj.predicates.definitions.present import PRESENT
+from ig2mj.predicates.definitions.real import REAL
 from ig2mj.predicates.definitions.saturated import SATURATED
 from ig2mj.predicates.definitions.sliced import SLICED
 from ig2mj.predicates.definitions.soaked import SOAKED
@@ -62,7 +63,7 @@ OWN: dict[str, Predicate] = {
 """The 19 predicates of the paper's table A.1, under their snake_case names."""
 
 OF_SUBSTANCES: dict[str, Predicate] = {
-    p.name: p for p in (COVERED, SATURATED, FILLED, CONTAINS, EMPTY, INSOURCE, PRESENT, HOT_PREDICATE)
+    p.name: p for p in (COVERED, SATURATED, FILLED, CONTAINS, EMPTY, INSOURCE, PRESENT, HOT_PREDICATE, REAL)
 }
 """Predicates of what covers and fills objects (docs/guide/substances.md), and others beyond the paper."""
 

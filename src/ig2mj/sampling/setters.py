@@ -32,6 +32,7 @@ from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.host import Randomness
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import StateSpec
+from ig2mj.states.substances import things
 from ig2mj.states.world import ExtendedStates, Swap
 
 Value = bool | float | int
@@ -218,6 +219,14 @@ def _sliced(t: _Task, value: bool) -> Change:
     return Change(*sliced.set_sliced(t.model, t.states, only, t.view))
 
 
+def _real(t: _Task, value: bool) -> Change:
+    if t.model.substances is None or t.objects[0] not in t.model.substances.things.object:
+        if value:
+            return Change(t.states)
+        raise StateError(f"'{t.object_name}' is in no transition rule of the scene, and always exists")
+    return Change(things.set_real(t.model, t.states, t.objects[0], value))
+
+
 def _dirty(dirt: Dirt) -> Callable[[_Task, bool], Change]:
     def setter(t: _Task, value: bool) -> Change:
         rows, done = getattr(t.states, dirt.name), True
@@ -252,6 +261,7 @@ _SETTERS: dict[str, Callable[[_Task, bool], Change]] = {
     "toggled_on": _toggled_on,
     "open": _open,
     "sliced": _sliced,
+    "real": _real,
     "dusty": _dirty(DUST),
     "stained": _dirty(STAIN),
 }

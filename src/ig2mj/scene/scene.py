@@ -32,6 +32,7 @@ from ig2mj.scene.merging import merged_home
 from ig2mj.scene.mjcf_files import read_mjcf
 from ig2mj.scene.mjcf_limits import check_mjcf
 from ig2mj.scene.object_requests import ObjectRequest, Pose, read_request
+from ig2mj.scene.parking import add_parking
 from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
 from ig2mj.scene.physics_digest import physics_digest
 from ig2mj.scene.rooms import Rooms, load_rooms
@@ -211,6 +212,7 @@ def _make_solid(spec: mujoco.MjSpec, manifest: Manifest, folder: pathlib.Path) -
     deepen_floors(spec, manifest)
     add_ceiling(spec, manifest)
     deepen_walls(spec, manifest)
+    add_parking(spec, manifest)
 
 
 Objects = str | os.PathLike | Sequence[str | os.PathLike]

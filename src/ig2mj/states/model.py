@@ -50,10 +50,11 @@ class StateModel:
         Raises:
           UnknownNameError: a substance is not known.
         """
-        holds = np.isin(np.arange(self.tables.num_objects), list(insides))
+        substances = SubstanceModel.build(self.tables, names, insides, self.parameters)
+        things = substances.things
+        holds = np.isin(np.arange(self.tables.num_objects), [*insides, *things.object[things.melts >= 0]])
         thermal = self.parameters.thermal | holds  # contents have the container's temperature
         parameters = dataclasses.replace(self.parameters, thermal=thermal)
-        substances = SubstanceModel.build(self.tables, names, insides, parameters)
         return dataclasses.replace(
             self, parameters=parameters, added=(*substance_states(), *self.added), substances=substances
         )
@@ -65,9 +66,13 @@ class StateModel:
 
     @functools.cached_property
     def swap_objects(self) -> Int[np.ndarray, "M"]:
-        """Objects that slicing moves, wholes first: the M axis of `Swap`."""
+        """Objects that slicing moves, wholes first, and then those that rules move: the M axis of `Swap`."""
         wholes = np.unique(self.parameters.half_whole)
-        return np.concatenate([wholes, self.parameters.half_object]).astype(int)
+        sliced = np.concatenate([wholes, self.parameters.half_object]).astype(int)
+        if self.substances is None:
+            return sliced
+        others = self.substances.things.object
+        return np.concatenate([sliced, others[~np.isin(others, sliced)]])
 
     @functools.cached_property
     def buttons(self) -> Int[np.ndarray, "B"]:

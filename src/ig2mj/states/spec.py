@@ -87,8 +87,8 @@ class EventStep:
     @classmethod
     def start(cls, model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations) -> EventStep:
         """The step before anything has happened."""
-        shape, moved = states.temperature.shape, (states.temperature.shape[0], len(model.swap_objects))
-        still = Swap(jnp.zeros(moved, bool), jnp.zeros((*moved, 3)), jnp.zeros((*moved, 4)))
+        shape = states.temperature.shape
+        still = Swap.nothing(shape[0], len(model.swap_objects))
         return cls(model, states, view, jnp.zeros(shape, jnp.int32), jnp.zeros(shape, bool), still, relations)
 
     def having(self, **fields: Any) -> EventStep:

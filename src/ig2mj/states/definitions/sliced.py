@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_multiply, quat_rotate
@@ -31,15 +31,20 @@ if TYPE_CHECKING:
 
 def cut(model: StateModel, sliced: Bool[Array, "W O"], view: PhysicsView) -> Bool[Array, "W O"]:
     """Which objects are cut in this step: sliceable, in one piece, in use, and under a blade with enough force."""
+    enough = under_blade(model, view, model.parameters.slice_force)
+    return enough & ~sliced & in_use(model, sliced)
+
+
+def under_blade(model: StateModel, view: PhysicsView, least: Float[np.ndarray, "O"]) -> Bool[Array, "W O"]:
+    """Objects on which a blade presses with more than `least` newtons."""
     tables = model.tables
     blades = np.flatnonzero((tables.link_kind == LinkKind.SLICER) & (tables.link_geom >= 0))
     blades = blades[model.parameters.has("slicer")[tables.link_object[blades]]]
     if len(blades) == 0:
-        return jnp.zeros(sliced.shape, bool)
+        return jnp.zeros(view.object_com.shape[:2], bool)
     force = jnp.asarray(view.link_force)[:, blades]  # [W, K, O]
     own = tables.link_object[blades][:, None] == np.arange(tables.num_objects)
-    enough = jnp.any((force > model.parameters.slice_force) & ~own, axis=1)
-    return enough & ~sliced & in_use(model, sliced)
+    return jnp.any((force > least) & ~own, axis=1)
 
 
 def in_use(model: StateModel, sliced: Bool[Array, "W O"]) -> Bool[Array, "W O"]:
@@ -61,9 +66,7 @@ def apply(
     """Marks what is cut, lets halves inherit, and says what is to be moved where."""
     states = dataclasses.replace(states, sliced=states.sliced | cut_now)
     if len(model.parameters.half_object) == 0:
-        worlds = cut_now.shape[0]
-        nothing = Swap(jnp.zeros((worlds, 0), bool), jnp.zeros((worlds, 0, 3)), jnp.zeros((worlds, 0, 4)))
-        return states, nothing
+        return states, Swap.nothing(cut_now.shape[0], len(model.swap_objects))
     states = jax.lax.cond(jnp.any(cut_now), lambda s: inherit(model, s, cut_now), lambda s: s, states)
     return states, _swap(model, cut_now, view)
 
@@ -84,11 +87,11 @@ def _swap(model: StateModel, cut_now: Bool[Array, "W O"], view: PhysicsView) -> 
     pos, quat = jnp.asarray(view.object_pos), jnp.asarray(view.object_quat)
     half_pos = pos[:, p.half_whole] + quat_rotate(quat[:, p.half_whole], p.half_pos)
     half_quat = quat_multiply(quat[:, p.half_whole], p.half_quat)
-    mask = jnp.concatenate([cut_now[:, wholes], cut_now[:, p.half_whole]], axis=1)
+    others = Swap.nothing(cut_now.shape[0], len(model.swap_objects) - len(wholes) - len(p.half_object))
     return Swap(
-        mask=mask,
-        pos=jnp.concatenate([pos[:, first_half], half_pos], axis=1),
-        quat=jnp.concatenate([quat[:, first_half], half_quat], axis=1),
+        mask=jnp.concatenate([cut_now[:, wholes], cut_now[:, p.half_whole], others.mask], axis=1),
+        pos=jnp.concatenate([pos[:, first_half], half_pos, others.pos], axis=1),
+        quat=jnp.concatenate([quat[:, first_half], half_quat, others.quat], axis=1),
     )
 
 

@@ -17,11 +17,13 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.errors import StateError
 from ig2mj.geometry.surface import object_surfaces, sample_surface, uncovered
 from ig2mj.knowledge.substances import DRY, DUST, STAIN, WATER, Substance, substance
-from ig2mj.knowledge.transitions import Transition, transitions_of
+from ig2mj.knowledge.transitions import Transition
 from ig2mj.scene.manifest import InsideEntry
+from ig2mj.scene.parking import rules_in_use
 from ig2mj.scene.tables import SceneTables
 from ig2mj.states.parameters import StateParameters
 from ig2mj.states.substances.containers import Containers
+from ig2mj.states.substances.things import Things
 
 if TYPE_CHECKING:
     from ig2mj.states.model import StateModel
@@ -48,7 +50,8 @@ class SubstanceModel:
       freeze: Celsius at which each is solid, -inf: never. has_volume: it can be in containers.
       cleaners: [U, U] whether a tool saturated with the second removes the first. dry: whether every tool does.
         wet: whether a tool soaked with water does.
-      rules: transition rules that have all they need among the substances. containers: see `Containers`.
+      rules: transition rules of containers that have all they need among the substances and objects. containers: see
+        `Containers`. things: objects that rules use up or make.
       covered: objects of the D axis. row: place of each object on it, or D. body, pos, normal: points, in the frames of
         bodies.
     """
@@ -62,6 +65,7 @@ class SubstanceModel:
     wet: Bool[np.ndarray, "U"]
     rules: tuple[Transition, ...]
     containers: Containers
+    things: Things
     covered: Int[np.ndarray, "D"]
     row: Int[np.ndarray, "O"]
     body: Int[np.ndarray, "D N"]
@@ -92,6 +96,7 @@ class SubstanceModel:
         row = np.full(tables.num_objects, len(covered))
         row[covered] = np.arange(len(covered))
         points = _all_points(tables, tuple(covered))
+        things, rules = Things.build(tables, rules_in_use(names, tables.object_categories), names, insides)
         return cls(
             substances=used,
             water=names.index(WATER) if WATER in names else -1,
@@ -102,7 +107,8 @@ class SubstanceModel:
             ),
             dry=np.array([DRY in s.cleaned_by for s in used], bool),
             wet=np.array([WATER in s.cleaned_by for s in used], bool),
-            rules=transitions_of(names),
+            rules=rules,
+            things=things,
             containers=Containers.build(tables, insides, parameters.has("waterSink")),
             covered=np.array(covered, int),
             row=row,

@@ -107,9 +107,17 @@ class _Binder:
         of_category: dict[str, list[ObjectEntry]] = {}
         for o in self.entries.values():
             of_category.setdefault(o.category, []).append(o)
+        #: Objects that rules make: the home has none, and one of the library waits outside until then.
+        self.made = {
+            a.part.arguments[0]
+            for a in self.activity.init
+            if isinstance(a, logic.Not) and isinstance(a.part, Atom) and a.part.predicate == "real"
+        }
         #: For every object of the activity the objects of the home that may play it, categories that say it best first.
         self.players = {
             name: [o for c in self.kinds[s].categories for o in of_category.get(c, ()) if self.may_play(o, name)]
+            if name not in self.made
+            else []
             for name, s in self.synset.items()
         }
         self.objects: dict[str, str] = {}
@@ -119,7 +127,7 @@ class _Binder:
 
     def may_play(self, o: ObjectEntry, name: str) -> bool:
         """Whether the activity can do with the object what it wants of `name`."""
-        return able(o, self.needs.get(name, ())) and not (o.fixed and name in self.placed)
+        return able(o, self.needs.get(name, ())) and not (o.fixed and (name in self.placed or name in self.made))
 
     def may_stand(self, o: ObjectEntry, name: str) -> bool:
         """Whether the object is loose, or stands in the room on whose floor the activity wants `name`."""

@@ -10,9 +10,11 @@ some things in another way:
     future mud.n.03_1, real mud.n.03_1       not present mud, present mud
     real half__apple.n.01_1                  sliced apple.n.01_1, likewise (not (real apple.n.01_1))
     future half__apple.n.01_1                not sliced apple.n.01_1
+    future bagel.n.01_1, real bagel.n.01_1   not real bagel.n.01_1, real bagel.n.01_1
 
-Halves that an activity waits for are the parts of their whole. A substance that an activity waits for must be one that
-a transition rule makes. What else 3.6 knows (attached, folded, ...) has no state here.
+Halves that an activity waits for are the parts of their whole. What else an activity waits for, a substance or an
+object, must be something that transition rules make of what the activity has (`ig2mj.knowledge.transitions`); what is
+made on the way is in use, too. What needs cloth (folded, draped, ...) has no state here.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from ig2mj.errors import Ig2mjError, UnknownNameError
 from ig2mj.knowledge.substances import substance
-from ig2mj.knowledge.transitions import is_makeable
+from ig2mj.knowledge.transitions import DRYERS, HALF, WASHERS, intermediates, makes_objects
 from ig2mj.predicates import find, logic
 from ig2mj.predicates.logic import Atom, Expression, Not
 from ig2mj.tasks.bddl.problem import Problem
@@ -35,8 +37,8 @@ OF_SUBSTANCES = ("covered", "saturated", "filled", "contains", "insource")
 SAME = ("ontop", "inside", "nextto", "under", "touching", "cooked", "frozen", "open", "toggled_on", "hot")
 """Other predicates that `ig2mj.predicates` has, perhaps under another name."""
 DIRT = {"stain.n.01": "stained", "dust.n.01": "dusty"}
-WATER = "water.n.06"
-HALF = "half__"
+WATER, WATER_NAME = "water.n.06", "water"
+HALF_OF = "half__"
 
 
 class VocabularyError(Ig2mjError):
@@ -134,13 +136,17 @@ class _Lowering:
         self.synset = problem.synset_of()
         self.unknown: set[str] = set()
         self.substances: set[str] = set()
+        self.future: set[str] = set()
         self.halves: dict[str, tuple[str, int]] = {}
+        #: Substances that are made on the way to what the activity waits for.
+        self.on_the_way: dict[str, None] = {}
         if not self.old:
             every = logic.atoms(logic.ground(logic.And((*problem.init, *problem.goal)), self.members))
             self.substances = {self.synset[a.arguments[1]] for a in every if a.predicate in OF_SUBSTANCES}
             waiting = [self.synset[a.arguments[0]] for a in every if a.predicate in ("real", "future")]
-            self.substances |= {s for s in waiting if is_substance(s)}
-            self.halves = self.find_halves({a.arguments[0] for a in every if a.predicate == "future"})
+            self.substances |= {s for s in waiting if is_substance(s) and not makes_objects(stem_of(s))}
+            self.future = {a.arguments[0] for a in every if a.predicate == "future"}
+            self.halves = self.find_halves(self.future)
 
     def members(self, group: str) -> tuple[str, ...]:
         return self.problem.objects[group]
@@ -151,9 +157,9 @@ class _Lowering:
         for synset, names in self.problem.objects.items():
             stem = synset.split(".")[0]
             waiting = [n for n in names if n in future]
-            if not stem.startswith(HALF) or not waiting:
+            if not stem.startswith(HALF_OF) or not waiting:
                 continue
-            same = [n for s, n in self.problem.objects.items() if s.split(".")[0] == stem.removeprefix(HALF)]
+            same = [n for s, n in self.problem.objects.items() if s.split(".")[0] == stem.removeprefix(HALF_OF)]
             wholes = [name for group in same for name in group if name not in future]
             for i, half in enumerate(waiting if wholes else ()):
                 whole = i * len(wholes) // len(waiting)
@@ -185,8 +191,8 @@ class _Lowering:
                 return Atom(a.predicate, (a.arguments[0], self.substance(synsets[1])))
             case "real" | "future" if synsets[0] in self.substances:
                 name = self.substance(synsets[0])
-                if a.predicate == "future" and not is_makeable(name):
-                    self.unknown.add(f"a rule that makes {name}")
+                if a.predicate == "future":
+                    self.note_made(name)
                 present = Atom("present", (name,))
                 return present if a.predicate == "real" else Not(present)
             case "real" | "future" if a.arguments[0] in self.halves:
@@ -194,11 +200,36 @@ class _Lowering:
                 return sliced if a.predicate == "real" else Not(sliced)
             case "real" if self.is_cut(a.arguments[0], synsets[0]):
                 return Not(Atom("sliced", a.arguments))
+            case "real" | "future" if self.is_thing(synsets[0]):
+                if a.predicate == "future":
+                    self.note_made(stem_of(synsets[0]))
+                real = Atom("real", a.arguments)
+                return real if a.predicate == "real" else Not(real)
         name = a.predicate
         if name not in SAME:
             self.unknown.add(name)
             return a
         return Atom(find(name).name, a.arguments)
+
+    def note_made(self, name: str) -> None:
+        """Notes what is made on the way to something that the activity waits for, or that no rule makes it."""
+        waiting = {stem_of(s) for s, names in self.problem.objects.items() if self.waits_for(names)}
+        given = {stem_of(s).replace(HALF_OF, HALF) for s in self.problem.objects} - waiting
+        if name == WATER_NAME and given & {*WASHERS, *DRYERS}:
+            return
+        found = intermediates(name, given)
+        if found is None:
+            self.unknown.add(f"a rule that makes {name}")
+        else:
+            self.on_the_way |= {n: None for n in found if not makes_objects(n)}
+
+    def waits_for(self, names: Sequence[str]) -> bool:
+        """Whether all of some names are not there at the start."""
+        return set(names) <= self.future
+
+    def is_thing(self, synset: str) -> bool:
+        """Whether a synset names objects, and not what comes to be by cutting."""
+        return bool(synset) and synset not in self.substances and not synset.startswith(HALF_OF)
 
     def substance(self, synset: str) -> str:
         """The substance of a synset; one that is not known is noted."""
@@ -216,7 +247,7 @@ class _Lowering:
                     found[a.arguments[1]] = None
                 elif a.predicate == "present":
                     found[a.arguments[0]] = None
-        return tuple(found)
+        return tuple(dict.fromkeys((*found, *self.on_the_way)))
 
     def is_cut(self, name: str, synset: str) -> bool:
         """Whether an object, or every object of a variable's synset, is a whole that halves wait for."""
