@@ -58,6 +58,7 @@ def test_a_dryer_without_a_switch_dries_while_it_is_closed():
     assert float(step(MODEL, _states(wet=True), VIEW).wetness[0, HOME.index["towel"]]) == 0.0
 
 
+@pytest.mark.slow
 def test_what_has_been_washed_is_idle():
     def idle(states) -> bool:
         return bool(washing.idle(EventStep.start(MODEL, states, VIEW, None)))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from ig2mj.errors import StateError, UnknownNameError
 from ig2mj.plugins import Registry
 from ig2mj.predicates.base import Predicate
+from ig2mj.predicates.definitions.attached import ATTACHED
+from ig2mj.predicates.definitions.broken import BROKEN_PREDICATE
 from ig2mj.predicates.definitions.burnt import BURNT
 from ig2mj.predicates.definitions.contains import CONTAINS
 from ig2mj.predicates.definitions.cooked import COOKED
@@ -22,6 +24,7 @@ from ig2mj.predicates.definitions.in_same_room_as_agent import IN_SAME_ROOM_AS_A
 from ig2mj.predicates.definitions.inside import INSIDE
 from ig2mj.predicates.definitions.insource import INSOURCE
 from ig2mj.predicates.definitions.next_to import NEXT_TO
+from ig2mj.predicates.definitions.on_fire import ON_FIRE_PREDICATE
 from ig2mj.predicates.definitions.on_floor import ON_FLOOR
 from ig2mj.predicates.definitions.on_top import ON_TOP
 from ig2mj.predicates.definitions.open import OPEN
@@ -67,7 +70,10 @@ OF_SUBSTANCES: dict[str, Predicate] = {
 }
 """Predicates of what covers and fills objects (docs/guide/substances.md), and others beyond the paper."""
 
-SHIPPED: dict[str, Predicate] = {**OWN, **OF_SUBSTANCES}
+OF_EXTRAS: dict[str, Predicate] = {p.name: p for p in (ATTACHED, BROKEN_PREDICATE, ON_FIRE_PREDICATE)}
+"""Predicates of states that a scene asks for (`ig2mj.scene.extras`)."""
+
+SHIPPED: dict[str, Predicate] = {**OWN, **OF_SUBSTANCES, **OF_EXTRAS}
 
 PREDICATES: Registry[Predicate] = Registry(
     "predicate",

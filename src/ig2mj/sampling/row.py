@@ -19,6 +19,7 @@ from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.writes import teleports
 from ig2mj.errors import StateError
 from ig2mj.predicates.literals import object_index, room_index
+from ig2mj.sampling.attaching import attach, number_of
 from ig2mj.sampling.bystanders import Bystanders
 from ig2mj.sampling.conditions import Condition, order
 from ig2mj.sampling.joints import JointMover
@@ -123,12 +124,27 @@ class RowSampler:
         self._set_all(cuts, rng)
         if not self._place_all(plan.placements, rng, budget, rejected):
             return None
-        self._set_all([c for c in plan.states if c not in cuts], rng)
+        joints = [c for c in plan.states if c.predicate == "attached"]
+        self._set_all([c for c in plan.states if c not in cuts and c not in joints], rng)
+        for condition in joints:
+            if not self._attach(condition, rng):
+                rejected[f"{condition.arguments[0]}: no place to attach it"] += 1
+                return None
         problem = self._problem((*conditions, *around), [name for name, _ in plan.placements])
         if problem:
             rejected[problem] += 1
             return None
         return Row(self.query.save(), self._states)
+
+    def _attach(self, condition: Condition, rng: np.random.Generator) -> bool:
+        """Attaches an object to another, or detaches it; whether that was possible."""
+        if self._holds((condition,)):
+            return True
+        number = number_of(self.model, *condition.arguments)
+        made = attach(self.query, self.model, self._states, number, condition.value, rng)
+        if made is not None:
+            self._states = made
+        return made is not None
 
     def _set_all(self, conditions: Sequence[Condition], rng: np.random.Generator) -> None:
         for condition in conditions:

@@ -219,6 +219,17 @@ def _sliced(t: _Task, value: bool) -> Change:
     return Change(*sliced.set_sliced(t.model, t.states, only, t.view))
 
 
+def _extra(name: str) -> Callable[[_Task, bool], Change]:
+    def setter(t: _Task, value: bool) -> Change:
+        if name not in t.model.extras:
+            raise StateError(f"the scene has no state '{name}': load it with objects=['with:{name}']")
+        write = registry.STATES[name].set
+        assert write is not None
+        return Change(dataclasses.replace(t.states, **write(t.states, t.mask, value)))
+
+    return setter
+
+
 def _real(t: _Task, value: bool) -> Change:
     if t.model.substances is None or t.objects[0] not in t.model.substances.things.object:
         if value:
@@ -262,6 +273,8 @@ _SETTERS: dict[str, Callable[[_Task, bool], Change]] = {
     "open": _open,
     "sliced": _sliced,
     "real": _real,
+    "on_fire": _extra("on_fire"),
+    "broken": _extra("broken"),
     "dusty": _dirty(DUST),
     "stained": _dirty(STAIN),
 }

@@ -21,6 +21,7 @@ import numpy as np
 
 from ig2mj.errors import Ig2mjError, UnknownNameError
 from ig2mj.scene.additions import Addition
+from ig2mj.scene.extras import is_extra
 from ig2mj.scene.library import LibraryModel, find_model, folder_of
 from ig2mj.scene.manifest import BUILDING, Manifest, ObjectEntry
 from ig2mj.scene.substance_requests import is_substances
@@ -92,8 +93,8 @@ def changes_of(remove: str | Iterable[str] = (), replace: Mapping[str, str | os.
 
 
 def added(requested: Iterable[object]) -> list:
-    """Of values of `objects` those that are objects to add, and neither changes nor substances."""
-    return [text for text in requested if read_change(text) is None and not is_substances(text)]
+    """Of values of `objects` those that are objects to add, and neither changes, substances nor further states."""
+    return [t for t in requested if read_change(t) is None and not is_substances(t) and not is_extra(t)]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -167,6 +167,7 @@ class Manifest(msgspec.Struct, omit_defaults=True):
     agents: list[AgentEntry] = []
     task: dict[str, Any] | None = None
     substances: list[str] = []  # in use, by the names of `ig2mj.knowledge.substances`
+    extras: list[str] = []  # further states that it has (`ig2mj.scene.extras`)
 
 
 def load_manifest(path: str | os.PathLike) -> Manifest:

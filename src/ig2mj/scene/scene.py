@@ -24,6 +24,7 @@ from ig2mj.scene.additions import Addition, plan_additions
 from ig2mj.scene.build_tables import build_tables
 from ig2mj.scene.ceilings import add_ceiling
 from ig2mj.scene.changes import Change, changes_of, read_change
+from ig2mj.scene.extras import add_joints, extras_as_text, pairs_of, read_extras
 from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
 from ig2mj.scene.library import find_model
@@ -110,7 +111,8 @@ class Scene:
     @property
     def changes_as_text(self) -> list[str]:
         """`requested` without the additions."""
-        return [*substances_as_text(self.substances), *(change.text for change in self.changes)]
+        extras = extras_as_text(self.manifest.extras)
+        return [*substances_as_text(self.substances), *extras, *(change.text for change in self.changes)]
 
     @property
     def name(self) -> str:
@@ -138,6 +140,8 @@ class Scene:
         if self.substances:
             insides = [(o.name, o.inside) for o in self.manifest.objects if o.inside is not None]
             hashed.update(msgspec.json.encode([self.substances, insides]))
+        if pairs := pairs_of(self.manifest.extras):
+            hashed.update(msgspec.json.encode(pairs))
         return _known_digests().get(hashed.hexdigest(), hashed.hexdigest())
 
     @functools.cached_property
@@ -213,6 +217,7 @@ def _make_solid(spec: mujoco.MjSpec, manifest: Manifest, folder: pathlib.Path) -
     add_ceiling(spec, manifest)
     deepen_walls(spec, manifest)
     add_parking(spec, manifest)
+    add_joints(spec, manifest)
 
 
 Objects = str | os.PathLike | Sequence[str | os.PathLike]
@@ -246,7 +251,8 @@ def load_scene(
         `<folder name>_<n>`, one of a library `<category>_<n>`; `n` goes on from the home's own. Objects of one's own
         are loose at their place unless they were converted as fixed, those of the library that ships are fixed for
         good; "fixed:" and "loose:" after the "@" say which. "remove:NAME" and "replace:NAME=MODEL" stand for the
-        arguments below.
+        arguments below. "with:on_fire", "with:broken" and
+        "with:attached:CHILD>PARENT" ask for further states (`ig2mj.scene.extras`).
       remove: objects of the home that are taken out, with what stands on or in them (`Scene.removed`).
       replace: objects of the home, and what takes their place and their name: a folder or a name of the object library.
         It is fixed to the house if the old one was. What stood on the old one is put down on the new one where that
@@ -276,6 +282,9 @@ def load_scene(
     if named:
         home = msgspec.structs.replace(home, substances=list(dict.fromkeys((*home.substances, *named))))
     check_substances(home.substances)
+    extras, others = read_extras(others)
+    if extras:
+        home = msgspec.structs.replace(home, extras=list(dict.fromkeys((*home.extras, *extras))))
     changes, requests = _requests([*changes_of(remove, replace), *others])
     if any(request.predicate for request in requests):
         plan = plan_additions(home, [dataclasses.replace(r, place=None) if r.predicate else r for r in requests])

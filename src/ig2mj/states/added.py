@@ -29,6 +29,19 @@ def substance_states() -> tuple[StateSpec, ...]:
     return tuple(_OF_SUBSTANCES)
 
 
+_EXTRAS: list[StateSpec] = []
+
+
+def ship_extra_states(specs: Iterable[StateSpec]) -> None:
+    """Makes the further states known that a scene may ask for, in the order of their updates."""
+    _EXTRAS[:] = specs
+
+
+def extra_states(names: Iterable[str] | None = None) -> tuple[StateSpec, ...]:
+    """The states of a scene that asks for these further states (`ig2mj.scene.extras`); None: all."""
+    return tuple(spec for spec in _EXTRAS if names is None or spec.extra in names)
+
+
 def added_states() -> tuple[StateSpec, ...]:
     """States of plug-ins, in the order in which they are updated: registered ones, then those of installed packages.
 

@@ -9,9 +9,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Int
 
+from ig2mj.scene.extras import ATTACHED, ON_FIRE, names_of
 from ig2mj.scene.manifest import InsideEntry, Manifest
 from ig2mj.scene.tables import LinkKind, SceneTables
-from ig2mj.states.added import added_states, substance_states
+from ig2mj.states.added import added_states, extra_states, substance_states
+from ig2mj.states.definitions import on_fire
+from ig2mj.states.definitions.attached import Joints
 from ig2mj.states.options import StateOptions
 from ig2mj.states.parameters import StateParameters, parameters_of_manifest
 from ig2mj.states.spec import StateSpec
@@ -27,6 +30,7 @@ class StateModel:
     Attributes:
       added: states of substances, where the scene has some, and those of plug-ins, in the order of their updates; by
         default all that are known now. substances: of the scene; None: it names none.
+      extras: names of further states of the scene. joints: what can be attached in it; None: nothing.
     """
 
     tables: SceneTables
@@ -34,15 +38,30 @@ class StateModel:
     options: StateOptions = DEFAULTS
     added: tuple[StateSpec, ...] = dataclasses.field(default_factory=added_states)
     substances: SubstanceModel | None = None
+    extras: tuple[str, ...] = ()
+    joints: Joints | None = None
 
     @classmethod
     def of_manifest(cls, tables: SceneTables, manifest: Manifest, options: StateOptions = DEFAULTS) -> StateModel:
         """The model of a loaded scene."""
         parameters = parameters_of_manifest(manifest, tables, options.compat)
+        made = cls(tables, parameters, options).with_extras(manifest)
         if not manifest.substances:
-            return cls(tables, parameters, options)
+            return made
         insides = {o: entry.inside for o, entry in enumerate(manifest.objects) if entry.inside is not None}
-        return cls(tables, parameters, options).with_substances(manifest.substances, insides)
+        return made.with_substances(manifest.substances, insides)
+
+    def with_extras(self, manifest: Manifest) -> StateModel:
+        """The same scene with the further states that its manifest asks for."""
+        names = names_of(manifest.extras)
+        if not names:
+            return self
+        parameters = self.parameters
+        if ON_FIRE in names:
+            parameters = dataclasses.replace(parameters, thermal=parameters.thermal | on_fire.flammable(self))
+        joints = Joints.of_manifest(self.tables, manifest) if ATTACHED in names else None
+        added = (*extra_states(names), *self.added)
+        return dataclasses.replace(self, parameters=parameters, added=added, extras=names, joints=joints)
 
     def with_substances(self, names: Sequence[str], insides: Mapping[int, InsideEntry]) -> StateModel:
         """The same scene with substances in use, and the insides of its containers, by object.

@@ -6,8 +6,8 @@ Names are those of `ig2mj.knowledge`; the paper's (table A.4) and iGibson's clas
 from __future__ import annotations
 
 from ig2mj.errors import UnknownNameError
-from ig2mj.states.added import STATES, ship_substance_states
-from ig2mj.states.definitions import from_physics, heat_source, open
+from ig2mj.states.added import STATES, ship_extra_states, ship_substance_states
+from ig2mj.states.definitions import attached, broken, from_physics, heat_source, on_fire, open
 from ig2mj.states.spec import StateSpec
 from ig2mj.states.substances.specs import SUBSTANCE_STATES
 from ig2mj.states.update import EVENTS, HEAT
@@ -29,8 +29,12 @@ SPECS: tuple[StateSpec, ...] = (
 """Every state of table A.4, and iGibson's others that can be asked. What keeps something has its line in the order of
 update (`ig2mj.states.update`). States of plug-ins are in `STATES` only."""
 
-STATES.ship({s.name: s for s in (*SPECS, *SUBSTANCE_STATES)})
+EXTRA_STATES: tuple[StateSpec, ...] = (attached.SPEC, broken.SPEC, on_fire.SPEC)
+"""States of scenes that ask for them (`ig2mj.scene.extras`)."""
+
+STATES.ship({s.name: s for s in (*SPECS, *SUBSTANCE_STATES, *EXTRA_STATES)})
 ship_substance_states(SUBSTANCE_STATES)
+ship_extra_states(EXTRA_STATES)
 
 _ALIASES = {alias: s for s in SPECS for alias in s.aliases}
 

@@ -162,7 +162,8 @@ class StateSpec:
       part: of the step in which `update` runs. "events": after switches, cuts, water and dirt, with an `EventStep`, in
         which temperatures are those of the step before. "heat": after the temperatures, with a `HeatStep`.
       queries: relations between objects that `update` reads (`EventStep.relations`), as of `RelationPlan.build`.
-      of_substances: only scenes that name substances have it.
+      of_substances: only scenes that name substances have it. extra: only scenes that ask for this have it
+        (`ig2mj.scene.extras`).
 
     Raises:
       ValueError: a piece is missing, or there is one too many; `part` is neither.
@@ -183,6 +184,7 @@ class StateSpec:
     part: str = "events"
     queries: Queries | None = None
     of_substances: bool = False
+    extra: str = ""
 
     def __post_init__(self):
         if self.part not in typing.get_args(Part):
@@ -229,7 +231,7 @@ class StateSpec:
 
     def belongs_to(self, model: StateModel, obj: int) -> bool:
         """Whether the object has the state."""
-        if self.of_substances and model.substances is None:
+        if (self.of_substances and model.substances is None) or (self.extra and self.extra not in model.extras):
             return False
         return self.abilities is None or bool(set(self.abilities) & set(model.parameters.abilities[obj]))
 

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int, UInt
 
 from ig2mj.engine.view import Array, PhysicsView, counted, length
 from ig2mj.errors import PluginError, StateError
-from ig2mj.states.added import added_states, substance_states
+from ig2mj.states.added import added_states, extra_states, substance_states
 from ig2mj.states.registry import SPECS
 from ig2mj.states.spec import Cut, StateSpec
 from ig2mj.states.swap import Swap
@@ -48,6 +48,9 @@ class ExtendedStates(_Fields):
             raise AttributeError(f"states have no '{name}'")
         if name in {field for spec in substance_states() for field in spec.fields}:
             raise NewStateError(f"there is no '{name}': load the scene with substances=['water', ...]")
+        for spec in extra_states():
+            if name in spec.fields:
+                raise NewStateError(f"there is no '{name}': load the scene with objects=['with:{spec.extra}...']")
         raise NewStateError(f"state '{name}' was registered after these states were made: load the scene again")
 
     def inherited(self, cut: Cut) -> ExtendedStates:
@@ -65,7 +68,7 @@ class ExtendedStates(_Fields):
 
 def _others() -> tuple[StateSpec, ...]:
     """States that not every scene has."""
-    return (*substance_states(), *added_states())
+    return (*substance_states(), *extra_states(), *added_states())
 
 
 def states_class(added: Iterable[StateSpec]) -> type[ExtendedStates]:

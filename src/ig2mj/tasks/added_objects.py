@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from ig2mj.errors import Ig2mjError
 from ig2mj.scene.additions import name_additions
 from ig2mj.scene.changes import added, read_change
+from ig2mj.scene.extras import is_extra
 from ig2mj.scene.library import LibraryName, find_model
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.object_requests import read_request
@@ -70,7 +71,7 @@ def object_texts(objects: Objects) -> tuple[str, ...]:
 def _text(requested: str | os.PathLike) -> str:
     if (change := read_change(requested)) is not None:
         return change.canonical.text
-    if is_substances(requested):
+    if is_substances(requested) or is_extra(requested):
         return str(requested)
     request = read_request(requested)
     model = find_model(request.reference)

@@ -101,7 +101,10 @@ class Core:
           randomize: what differs between episodes; the engine must have its `model_fields`.
         """
         self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
-        self.grasping, self.hands = grasping, Hands(engine, grasping, self.controllers)
+        self.grasping, self.hands = (
+            grasping,
+            Hands(engine, grasping, self.controllers, None if rules is None else rules.model.joints),
+        )
         self.cameras = AgentCameras(engine, self.controllers)
         self.hand_resets = HandResets(engine, self.controllers, hand_resets)
         self.controls = Controls(engine, self.controllers)
@@ -202,8 +205,10 @@ class Core:
         With `physics_step` it is `advance_fn` in two parts, for callers that keep the physics between them.
         """
         view = self.cameras.placed(view, controllers)
+        before = states
         physics, view, states, status = self._apply_rules(physics, view, states, controllers)
-        physics, after, grasps = self.hands.act(physics, view, grasps, controllers)
+        physics, after, grasps = self.hands.act(physics, view, grasps, controllers, states)
+        physics, after = self.hands.join(physics, after, grasps, before, states)
         if after is not view:
             view = self.cameras.placed(after, controllers)
         return Advanced(physics, view, states, status, grasps)

@@ -17,7 +17,10 @@ from ig2mj.agents.grasping import Grasping, GraspState
 from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
+from ig2mj.states.definitions.attached import Joints
+from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.batch import select_worlds
+from ig2mj.worlds.joints import JointSwitch
 
 Held = GraspState | None
 """What hands hold; None where they hold by friction alone."""
@@ -35,8 +38,17 @@ def check_grasping(engine: Engine, grasping: Grasping | None) -> None:
 class Hands:
     """The hands of an engine's worlds. `act` and `read` may be part of a compiled program."""
 
-    def __init__(self, engine: Engine, grasping: Grasping | None, controllers: Sequence[Controller]):
+    def __init__(
+        self,
+        engine: Engine,
+        grasping: Grasping | None,
+        controllers: Sequence[Controller],
+        joints: Joints | None = None,
+    ):
         """Binds a rule of grasping to an engine and to the controllers that ask hands to close.
+
+        Args:
+          joints: what can be attached in the scene.
 
         Raises:
           EngineError: the engine cannot hold by that rule; see `check_grasping`.
@@ -45,25 +57,53 @@ class Hands:
         self._engine, self._grasping, self._controllers = engine, grasping, tuple(controllers)
         self._holds = grasping is not None and grasping.active
         self._nothing = np.zeros(engine.num_worlds, bool)
+        self._joints = JointSwitch.of(engine, joints)
         self._update = engine.compile(self._updated, self._idle)
         if grasping is not None:
             self._constraints, self._read = engine.compile(grasping.write), engine.compile(grasping.read)
             self._ended, self._loaded = engine.compile(grasping.ended), engine.compile(grasping.loaded)
 
     def act(
-        self, physics: Physics, view: PhysicsView, held: Held, controllers: tuple[Any, ...]
+        self, physics: Physics, view: PhysicsView, held: Held, controllers: tuple[Any, ...], states: Any = None
     ) -> tuple[Physics, PhysicsView, Held]:
-        """Physics, view and grasps after hands took hold or let go. Consumes `physics`."""
+        """Physics, view and grasps after hands took hold or let go. Consumes `physics`.
+
+        Args:
+          states: in which what is attached stays so.
+        """
         if not self._holds or held is None:
             return physics, view, held
         assert self._grasping is not None
         after, changed = self._update(view, held, controllers)
 
         def constrain(physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
-            return self._engine.write_with_view(physics, self._constraints(after), view)
+            write = self._constraints(after)
+            if self._joints is not None:
+                write = self._joints.joined(write, states)
+            return self._engine.write_with_view(physics, write, view)
 
         physics, view = self._engine.when_any(changed, constrain, physics, view, cheap=True)
         return physics, view, after
+
+    def join(
+        self, physics: Physics, view: PhysicsView, held: Held, before: ExtendedStates, after: ExtendedStates
+    ) -> tuple[Physics, PhysicsView]:
+        """Physics and view after the constraints of what the states attach, or no longer do. Consumes `physics`."""
+        if self._joints is None:
+            return physics, view
+        joints, worlds = self._joints, self._engine.num_worlds
+
+        def switch(physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
+            return self._engine.write_with_view(physics, self._joined(held, worlds, after), view)
+
+        return self._engine.when_any(joints.changed(before, after), switch, physics, view, cheap=True)
+
+    def _joined(self, held: Held, worlds: int, states: ExtendedStates) -> Write:
+        """All constraints: what hands hold, and what is attached."""
+        assert self._joints is not None
+        if self._holds and held is not None:
+            return self._joints.joined(self._constraints(held), states)
+        return self._joints.joined(self._joints.none_held(worlds), states)
 
     def _idle(self, view: PhysicsView, held: GraspState, controllers: tuple[Any, ...]) -> tuple | None:
         """What `_updated` returns where no hand can hold or let go of anything."""

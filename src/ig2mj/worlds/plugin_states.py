@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ig2mj.errors import InputError, PluginError
-from ig2mj.states.added import STATES, substance_states
+from ig2mj.states.added import STATES, extra_states, substance_states
 from ig2mj.states.world import ExtendedStates, added_fields
 from ig2mj.worlds.archive import name_of
 
@@ -29,6 +29,7 @@ def plugin_header(states: ExtendedStates | None) -> dict[str, dict[str, str]]:
     sources = STATES.sources()
     by_field = {field: sources[name] for name, spec in STATES.added().items() for field in spec.fields}
     by_field |= {field: "substances of its scene" for spec in substance_states() for field in spec.fields}
+    by_field |= {field: f"with:{spec.extra} of its scene" for spec in extra_states() for field in spec.fields}
     return {KEY: {field: by_field.get(field, "this program") for field in fields}} if fields else {}
 
 

@@ -20,6 +20,7 @@ from ig2mj.knowledge import synset
 from ig2mj.predicates import find, logic
 from ig2mj.predicates.logic import Atom
 from ig2mj.scene.additions import name_additions
+from ig2mj.scene.extras import ATTACHED, BROKEN, ON_FIRE, PREFIX, attached_as_text
 from ig2mj.scene.library import LibraryModel, library
 from ig2mj.scene.manifest import Manifest, ObjectEntry
 from ig2mj.scene.substance_requests import substances_as_text
@@ -71,8 +72,21 @@ class Binding:
 
     @property
     def requested(self) -> tuple[str, ...]:
-        """What `load_scene(home, objects=...)` must be given: the additions, and the substances in use."""
-        return (*self.additions, *substances_as_text(self.activity.substances))
+        """What `load_scene(home, objects=...)` must be given: the additions, substances in use, further states."""
+        return (*self.additions, *substances_as_text(self.activity.substances), *self.extras)
+
+    @property
+    def extras(self) -> tuple[str, ...]:
+        """Further states that the activity needs, as `load_scene(objects=...)` takes them."""
+        every = (*self.activity.init, *self.activity.goal)
+        grounded = logic.atoms(logic.ground(logic.And(every), self.activity.objects.__getitem__))
+        found: dict[str, None] = {}
+        for a in grounded:
+            if a.predicate in (ON_FIRE, BROKEN):
+                found[f"{PREFIX}{a.predicate}"] = None
+            elif a.predicate == ATTACHED:
+                found[attached_as_text(*(self.objects[name] for name in a.arguments))] = None
+        return tuple(found)
 
 
 def bind(activity: Activity, manifest: Manifest, agents: Sequence[str] = ()) -> Binding:
@@ -98,6 +112,8 @@ class _Binder:
         self.placed = {
             a.arguments[0] for a in self.activity.init if isinstance(a, Atom) and a.predicate in PLACES
         } - set(self.activity.rooms)
+        every = logic.ground(logic.And((*self.activity.init, *self.activity.goal)), self.activity.objects.__getitem__)
+        self.placed |= {a.arguments[0] for a in logic.atoms(every) if a.predicate == ATTACHED}
         self.floors = {
             a.arguments[0]: a.arguments[1]
             for a in self.activity.init
