@@ -34,23 +34,10 @@ from ig2mj.tasks.bddl.synsets import FLOOR, ROOM_STAND_INS
 BEHAVIOR_1K = "omnigibson"
 OF_SUBSTANCES = ("covered", "saturated", "filled", "contains", "insource")
 """Predicates of an object and a substance, under the same names here."""
-SAME = tuple(
-    [
-        "ontop",
-        "inside",
-        "nextto",
-        "under",
-        "touching",
-        "cooked",
-        "frozen",
-        "open",
-        "toggled_on",
-        "hot",
-        "attached",
-        "broken",
-        "on_fire",
-    ]
-)
+SAME = (
+    "ontop", "inside", "nextto", "under", "touching", "cooked", "frozen",
+    "open", "toggled_on", "hot", "attached", "broken", "on_fire",
+)  # fmt: skip
 """Other predicates that `ig2mj.predicates` has, perhaps under another name."""
 DIRT = {"stain.n.01": "stained", "dust.n.01": "dusty"}
 WATER, WATER_NAME = "water.n.06", "water"
