@@ -20,16 +20,21 @@ MOST_CATEGORIES = 8
 
 STAND_INS = {
     "bookcase.n.01": "shelf.n.01",
+    "bratwurst.n.01": "sausage.n.01",
     "bottle__of__soda.n.01": "pop.n.02",
     "can__of__soda.n.01": "pop.n.02",
     "mail.n.04": "envelope.n.01",
     "packing_box.n.02": "carton.n.02",
     "sunglasses.n.02": "sunglass.n.01",
     "canister.n.02": "jar.n.01",
+    "comic_book.n.01": "magazine.n.02",
     "hinged_jar.n.01": "jar.n.01",
+    "hingeless_jar.n.01": "jar.n.01",
     "mixing_bowl.n.01": "bowl.n.01",
     "mop_bucket.n.01": "bucket.n.01",
     "pot.n.04": "caldron.n.01",
+    "raw_egg.n.01": "egg.n.02",
+    "textbook.n.01": "hardback.n.01",
     "sponge.n.01": "rag.n.01",
     "tupperware.n.01": "bowl.n.01",
     "watering_can.n.01": "kettle.n.01",
@@ -44,6 +49,8 @@ CONTAINERS = {
     "bag": ("paper_bag",),
     "box": ("carton",),
     "carton": ("milk", "carton"),
+    "package": ("package", "carton"),
+    "tin": ("canned_food", "pop"),
     "can": ("pop",),
 }
 """Kinds of container (`salt__shaker`, `liquid_soap__bottle`) and the categories that stand for one of any content."""
