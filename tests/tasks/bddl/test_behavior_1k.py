@@ -86,6 +86,6 @@ def test_definitions_without_cloth_attachment_and_dicing_can_be_expressed(packag
             expressed.append(load_activity(name, behavior_1k=True))
         except VocabularyError:
             continue
-    assert len(expressed) == 806
+    assert len(expressed) == 934
     with pytest.raises(UnknownNameError, match="near matches"):
         load_activity("loading_the_cars", behavior_1k=True)

@@ -208,9 +208,9 @@ def _objects_changed(step: EventStep, now: _Now) -> EventStep:
     pos = jnp.where(comes[..., None], over, own.park)
     upright = jnp.broadcast_to(jnp.array([1.0, 0.0, 0.0, 0.0]), (*moves.shape, 4))
     swap = Swap(
-        mask=swap.mask.at[:, columns].set(swap.mask[:, columns] | moves),
-        pos=swap.pos.at[:, columns].set(jnp.where(moves[..., None], pos, swap.pos[:, columns])),
-        quat=swap.quat.at[:, columns].set(jnp.where(moves[..., None], upright, swap.quat[:, columns])),
+        mask=jnp.asarray(swap.mask).at[:, columns].set(swap.mask[:, columns] | moves),
+        pos=jnp.asarray(swap.pos).at[:, columns].set(jnp.where(moves[..., None], pos, swap.pos[:, columns])),
+        quat=jnp.asarray(swap.quat).at[:, columns].set(jnp.where(moves[..., None], upright, swap.quat[:, columns])),
     )
     step = dataclasses.replace(step, swap=swap)
     return step.having(
