@@ -94,13 +94,15 @@ class Body(Protocol):
 
     Attributes:
       size: n. hands: numbers of its hands among all hands of the scene. grips: [H, 3] m, the point with which each hand
-        takes hold, in its frame. sideways: its base moves in any direction.
+        takes hold, in its frame. sideways: its base moves in any direction. stands: m, height of a body that hovers;
+        else 0.
     """
 
     size: int
     hands: Int[np.ndarray, "H"]
     grips: Float[np.ndarray, "H 3"]
     sideways: bool
+    stands: float
 
     def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
         """The controller's action of the present phases."""
@@ -122,6 +124,8 @@ def body_of(scene: Scene, controller: Controller, agent: int = 0) -> Body:
 
 
 class _Body:
+    stands = 0.0
+
     def __init__(self, scene: Scene, controller: Controller, agent: int):
         robot = scene.agents[agent]
         self._names, self.size = tuple(controller.action_names), controller.action_size
@@ -163,8 +167,9 @@ class HoveringBody(_Body):
     """The humanoid: a body that moves in any direction, and hands whose targets are displaced in its frame.
 
     Attributes:
-      reach: m from a shoulder that a hand goes. shoulders, carry, rest: [H, 3] m, in the body's frame: of the
-        shoulders, and of the grasp points where hands carry things and where empty hands rest.
+      reach: m from a shoulder that a hand goes. shoulders, carry, rest, tucked: [H, 3] m, in the body's frame: of the
+        shoulders, and of the grasp points where hands carry things, where empty hands rest, and where they are in
+        narrow places.
     """
 
     sideways = True
@@ -172,9 +177,10 @@ class HoveringBody(_Body):
     def __init__(self, scene: Scene, controller: Controller, agent: int):
         super().__init__(scene, controller, agent)
         robot = scene.agents[agent]
-        self._stands = float(robot.stands) if isinstance(robot, TaskRobot) else 0.0
+        self.stands = float(robot.stands) if isinstance(robot, TaskRobot) else 0.0
         self.reach, self.shoulders = HAND_REACH - SPARE_REACH, np.array(SHOULDER_POS)
         self.carry = np.array([[CARRY[0], side * CARRY[1], CARRY[2]] for side in (1, -1)])
+        self.tucked = np.array([[TUCKED[0], side * TUCKED[1], TUCKED[2]] for side in (1, -1)])
         self.rest = np.array(HAND_POS) + np.stack(
             [np.asarray(quat_rotate(q, g)) for q, g in zip(HAND_QUAT, self.grips, strict=True)]
         )
@@ -207,7 +213,7 @@ class HoveringBody(_Body):
         moves = (mode == Base.SHIFT) | ((mode == Base.DRIVE) & (np.abs(left) < AHEAD))
         speed = np.where(rows["hand"] >= 0, SPEED_OF_BASE, rows["speed"])
         share = np.where(moves, np.minimum(1.0, speed / np.maximum(apart, 1e-6)), 0.0)
-        rise = UPRIGHT * (self._stands - senses.base_pos[:, 2])
+        rise = UPRIGHT * (self.stands + rows["rise"] - senses.base_pos[:, 2])
         move = np.concatenate([share[:, None] * offset, np.clip(rise, -0.05, 0.05)[:, None]], axis=1)
         up = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), move.shape)
         turn = UPRIGHT * cross(quat_rotate(senses.base_quat, up), up)
@@ -237,8 +243,9 @@ class HoveringBody(_Body):
         return move, turn
 
 
-SPARE_REACH, CARRY = 0.05, (0.34, 0.16, 0.5)
-"""m that are left of an arm's reach; forwards, to the side and up: where a hand carries what it holds, above tables."""
+SPARE_REACH, CARRY, TUCKED = 0.05, (0.34, 0.16, 0.5), (0.1, 0.1, 0.1)
+"""m that are left of an arm's reach; forwards, to the side and up: where a hand carries what it holds, above tables,
+and where an empty one is in narrow places."""
 
 SPEED_OF_BASE = 0.05
 """m in an agent step of a base that moves together with a hand."""

@@ -19,6 +19,7 @@ from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp
 from ig2mj.planning.handing_over import hand_over
 from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_path, hand_with, travel, vector3
+from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
@@ -70,6 +71,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             yield from toggle(True)(world, Step("toggle_on", (tool,)))
         reason, detail, lost, tried = "no_base", f"no dirt of {name} is in reach", 0, collections.Counter[int]()
         visited: list[Stance] = []
+        opened = Tried()
         for attempt in range(ROUNDS):
             if not world.facts.holds(predicate, name):
                 break
@@ -89,6 +91,8 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             spots = [spot for spot in world.dirt(predicate, name) if tried[spot.number] < TRIES]
             spots.sort(key=lambda spot: tried[spot.number])
             plan = _plan(world, tool, hand, spots, visited)
+            while plan is None and (yield from open_around(world, name, opened)):
+                plan = _plan(world, tool, hand, spots, visited)
             if plan is None:
                 break
             visited.append(plan.stance)

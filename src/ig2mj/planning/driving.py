@@ -12,7 +12,7 @@ from collections.abc import Generator
 import numpy as np
 
 from ig2mj.planning.motion_planner import NEAR_START, FreeFloor
-from ig2mj.planning.moves import Program, rest
+from ig2mj.planning.moves import UP, Program, rest, vector3
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.planning.world import PlannedWorld, Stance
@@ -25,6 +25,11 @@ NEAR = 1.0
 
 STRAYED = 0.15
 """m from where an empty hand rests beyond which it goes back before the robot drives."""
+
+SLIGHT = 0.02
+"""m of stretching and stooping that do not count."""
+
+FORWARDS = np.array([1.0, 0.0, 0.0])
 
 STEP = 0.1
 """m between stances at which what is held is checked."""
@@ -39,28 +44,50 @@ def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     here, yaw = world.base
     apart = float(np.linalg.norm(here - stance.xy))
     turned = abs((yaw - stance.yaw + np.pi) % (2 * np.pi) - np.pi)
+    rises, stoops = abs(stance.rise) > SLIGHT, abs(world.stance.rise) > SLIGHT
     if apart < 0.04 and turned < 0.1:
-        return ""
+        return (yield [stretch(stance.rise)]) if rises or stoops else ""
     for hand, name in enumerate(world.held):
         if not name and np.linalg.norm(world.grip(hand) - world.resting(hand, world.stance)) > STRAYED:
             yield rest(hand)
+    if stoops:
+        yield [stretch(0.0)]
+    last = [stretch(stance.rise)] if rises else []
     standing = world.floor()
     if not any(n and not world.domain.fixed(n) for n in world.held):
-        way = standing.way(here, stance.xy)
-        return "no_path" if way is None else (yield drive(way, stance.yaw))
+        way, before = world.floor(reaching=True).way(here, stance.xy), list[Phase]()
+        if way is None:
+            way, before = standing.way(here, stance.xy), tuck(world)
+        return "no_path" if way is None else (yield [*before, *drive(way, stance.yaw), *last])
+    if tucked := tuck(world):
+        yield tucked
     if apart < 0.3 and turned < 0.3 and world.clear_with_held(_between(Stance((here[0], here[1]), yaw), stance)):
-        return (yield [shift(stance)])
+        return (yield [shift(stance), *last])
     turning = world.floor(holding=True)
     start = _backed(world, Stance((float(here[0]), float(here[1])), yaw), standing, turning)
     end = _backed(world, stance, standing, turning)
     way = None if start is None or end is None else turning.way(start.xy, end.xy)
     if way is None:  # what is held may touch something on the way
         way = standing.way(here, stance.xy)
-        return "no_path" if way is None else (yield drive(way, stance.yaw))
+        return "no_path" if way is None else (yield [*drive(way, stance.yaw), *last])
     assert start is not None and end is not None
     program = [] if start.xy == (here[0], here[1]) else [shift(start)]
     program += drive(way, stance.yaw)
-    return (yield program if end.xy == stance.xy else [*program, shift(stance)])
+    return (yield [*program, *([] if end.xy == stance.xy else [shift(stance)]), *last])
+
+
+def stretch(rise: float) -> Phase:
+    """The body stretches or stoops, m."""
+    return Phase(rise=rise, limit=20, after="")
+
+
+def tuck(world: PlannedWorld) -> Program:
+    """Fingers of empty hands point up, so that the robot fits where they would stick out."""
+    return [
+        Phase(hand=hand, pos=vector3(world.body.tucked[hand]), quat=world.body.turned(hand, UP, FORWARDS), in_body=True,
+              tolerance=0.05, turn_tolerance=0.3, limit=15, after="")
+        for hand, name in enumerate(world.held) if not name
+    ]  # fmt: skip
 
 
 def drive_near(world: PlannedWorld, name: str) -> Generator[Program, str, tuple[str, str]]:

@@ -23,13 +23,17 @@ SETTLING = 2
 """Agent steps that a phase lasts at least: a hand that is asked to open or close needs them."""
 
 
+RISEN = 0.03
+"""m within which a body is at its height."""
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Carry:
     """What following programs remembers.
 
     Attributes:
       programs: of all worlds. phase: number of the present one. steps: agent steps in it. status: of each world.
-      rows: the present phases.
+      rows: the present phases. rise: m by which bodies are asked to be above their height.
     """
 
     programs: Programs
@@ -37,6 +41,7 @@ class Carry:
     steps: Int[np.ndarray, "W"]
     status: Int[np.ndarray, "W"]
     rows: Rows
+    rise: Float[np.ndarray, "W"]
 
     @property
     def running(self) -> Bool[np.ndarray, "W"]:
@@ -53,7 +58,7 @@ def begin(programs: Sequence[Sequence[Phase]]) -> Carry:
     packed = Programs.pack(programs)
     zero = np.zeros(len(programs), np.int32)
     status = np.where(packed.length > 0, RUNNING, DONE).astype(np.int32)
-    return Carry(packed, zero, zero, status, packed.at(zero))
+    return Carry(packed, zero, zero, status, packed.at(zero), np.zeros(len(programs), np.float32))
 
 
 def begin_some(carry: Carry, programs: Sequence[Sequence[Phase] | None], kept: Sequence[Sequence[Phase]]) -> Carry:
@@ -66,7 +71,7 @@ def begin_some(carry: Carry, programs: Sequence[Sequence[Phase] | None], kept: S
     new = np.array([p is not None for p in programs])
     phase = np.where(new, 0, carry.phase)
     status = np.where(new, fresh.status, carry.status)
-    return Carry(fresh.programs, phase, np.where(new, 0, carry.steps), status, fresh.programs.at(phase))
+    return Carry(fresh.programs, phase, np.where(new, 0, carry.steps), status, fresh.programs.at(phase), carry.rise)
 
 
 def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Float[np.ndarray, "W n"], Carry]:
@@ -89,9 +94,11 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     finished = forward & (phase >= carry.programs.length)
     status = np.where(running & (failed > 0), failed, np.where(finished, DONE, carry.status))
     rows = carry.programs.at(phase) if forward.any() else rows
-    new = Carry(carry.programs, phase, np.where(forward, 0, carry.steps + 1), status.astype(np.int32), rows)
+    rise = np.where(np.isnan(rows["rise"]), carry.rise, rows["rise"])
+    new = Carry(carry.programs, phase, np.where(forward, 0, carry.steps + 1), status.astype(np.int32), rows, rise)
     going = new.running
     still = {**rows, "base": np.where(going, rows["base"], Base.STAY), "hand": np.where(going, rows["hand"], -1)}
+    still["rise"] = rise
     return body.command(senses, still).astype(np.float32), new
 
 
@@ -102,6 +109,7 @@ def _ended(body: Body, senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
     moves = (rows["base"] == Base.DRIVE) | (rows["base"] == Base.SHIFT)
     turns = (rows["base"] == Base.TURN) | (rows["base"] == Base.SHIFT)
     there = (~moves | (apart < rows["tolerance"])) & (~turns | (turned < rows["turn_tolerance"]))
+    there &= np.isnan(rows["rise"]) | (np.abs(body.stands + rows["rise"] - senses.base_pos[:, 2]) < RISEN)
     held, empty = np.zeros(len(there), bool), np.ones(len(there), bool)
     world, index = np.arange(len(there)), np.maximum(rows["object"], 0)
     pos, quat = goals_of_hand(senses, rows)

@@ -25,7 +25,7 @@ from ig2mj.planning.moves import (
     travel,
     vector3,
 )
-from ig2mj.planning.opening import open_around
+from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
@@ -48,13 +48,14 @@ def grasp(world: PlannedWorld, step: Step) -> Primitive:
         return Outcome()
     if not is_graspable(world, name):
         return Outcome("no_grasp", f"{name} is fixed, or its category allows no assisted grasp")
-    reason, detail, tried = "no_grasp", "", list[GraspPose]()
+    reason, detail, tried, moved = "no_grasp", "", list[GraspPose](), Tried()
     for attempt in range(ATTEMPTS):
         hand = free_hand(world, attempt)
         found = _plan(world, name, hand, tried)
+        while found is None and (yield from open_around(world, name, moved)):
+            found = _plan(world, name, hand, tried)
         if found is None:
             reason, detail = "no_base", f"no free floor from which a hand has a way to {name}"
-            yield from open_around(world, name, attempt)
             continue
         stance, pose = found
         if reason := (yield from go(world, stance)):

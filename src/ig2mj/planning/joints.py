@@ -54,6 +54,10 @@ class OpenableJoint:
         """How far it is open, 0 to 1."""
         return (self.now - self.closed) / (self.open - self.closed)
 
+    def surrounds(self, point: Vector) -> bool:
+        """Whether a point is in the box of the link, as what lies in a drawer is."""
+        return bool((self.vertices.min(0) <= point).all() and (point <= self.vertices.max(0)).all())
+
     def moved(self, points: Float[np.ndarray, "V 3"], by: float) -> Float[np.ndarray, "V 3"]:
         """Points of the link after the joint has moved."""
         if not self.hinge:

@@ -64,6 +64,7 @@ class _Robot:
     hands: list[Pose]
     held: list[str]
     grasps: list[Pose | None]
+    rise: float = 0.0
 
 
 class KinematicStage:
@@ -261,7 +262,7 @@ class KinematicRung:
         self._stage.put(self._base(robot), robot.hands, held)
 
     def _base(self, robot: _Robot) -> Pose:
-        return np.array([*robot.xy, self._height]), _turn(robot.yaw)
+        return np.array([*robot.xy, self._height + robot.rise]), _turn(robot.yaw)
 
     def _follow(self, world: int, program: Program, step: Step) -> str:
         """What a program does; the reason why it failed."""
@@ -286,9 +287,10 @@ class KinematicRung:
             xy = np.array(phase.xy)
         if phase.base in (Base.TURN, Base.SHIFT):
             yaw = phase.yaw
-        before, (pos, quat) = self._base(robot), (np.array([*xy, self._height]), _turn(yaw))
-        robot.hands = [_of((pos, quat), _in(before, hand)) for hand in robot.hands]
+        before = self._base(robot)
         robot.xy, robot.yaw = xy, yaw
+        robot.rise = robot.rise if phase.rise is None else phase.rise
+        robot.hands = [_of(self._base(robot), _in(before, hand)) for hand in robot.hands]
 
     def _move_hand(self, world: int, phase: Phase, step: Step) -> str:
         robot, hand = self._robots[world], phase.hand

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 from collections.abc import Callable, Generator
 
@@ -50,6 +51,9 @@ LAST = 0.1
 UPRIGHT = 0.5
 """Horizontal part of the normal of a face from which on the robot stands in front of it: not of a lid's."""
 
+WIDE, TRIES = 0.5, 2
+"""Share of a joint's range from which on it is not in the way of a hand, and times that it is moved out of the way."""
+
 STANCES, WAYS = 20, 12
 """Stances for each grip, and ways of a hand that are looked for with one kind of grip, at most."""
 
@@ -83,27 +87,39 @@ def joints_of(world: PlannedWorld, name: str) -> list[OpenableJoint]:
     return openable_joints(world.stage.scene, world.view, world.index(name), world.world)
 
 
-def open_around(world: PlannedWorld, name: str, attempt: int) -> Generator[Program, str, None]:
-    """Opens a door or drawer further that may keep a hand from an object, the nearest first."""
+Tried = collections.Counter[str]
+"""How often joints were moved out of the way in vain, by their names."""
+
+
+def open_around(world: PlannedWorld, name: str, tried: Tried) -> Generator[Program, str, bool]:
+    """Opens a door or drawer that may keep a hand from an object, the nearest first; where all are open, shuts a drawer
+    that the object is not in. Returns whether there was one that has not been tried `TRIES` times."""
     found = [j for c in world.facts.containers(name) if world.domain.opens(c) for j in joints_of(world, c)]
-    yield from _open_one(world, found, world.com(name), attempt)
+    near = world.com(name)
+    found.sort(key=lambda j: float(np.linalg.norm(j.vertices.mean(0) - near)))
+    return (yield from _move_one(world, found, near, tried))
 
 
-def open_into(world: PlannedWorld, where: str, attempt: int) -> Generator[Program, str, bool]:
-    """Opens a door or drawer of a container further; returns whether there was one to open."""
+def open_into(world: PlannedWorld, where: str, tried: Tried) -> Generator[Program, str, bool]:
+    """Opens a door or drawer of a container, the largest first; arguments and result as of `open_around`."""
     found = joints_of(world, where) if world.domain.opens(where) else []
-    return (yield from _open_one(world, found, None, attempt))
+    return (yield from _move_one(world, found, None, tried))
 
 
-def _open_one(
-    world: PlannedWorld, joints: list[OpenableJoint], near: Vector | None, attempt: int
+def _move_one(
+    world: PlannedWorld, joints: list[OpenableJoint], near: Vector | None, tried: Tried
 ) -> Generator[Program, str, bool]:
-    shut = [j for j in joints if j.fraction < AJAR]
-    if not shut or all(world.held):
+    if all(world.held):
         return False
-    if near is not None:
-        shut.sort(key=lambda j: float(np.linalg.norm(j.vertices.mean(0) - near)))
-    yield from move_joint(world, shut[attempt % len(shut)], free_hand(world), True)
+    shut = [j for j in joints if j.fraction < WIDE and tried[j.name] < TRIES]
+    out = [j for j in joints if near is not None and not j.hinge and j.fraction > AJAR and not j.surrounds(near)]
+    out = [j for j in out if tried[f"{j.name} shut"] < TRIES]
+    if not shut and not out:
+        return False
+    joint, opens = (shut[0], True) if shut else (out[0], False)
+    key = joint.name if opens else f"{joint.name} shut"
+    yield from move_joint(world, joint, free_hand(world, tried[key]), opens, tried[key])
+    tried[key] += 1
     return True
 
 

@@ -59,6 +59,7 @@ class Phase:
       tolerance, turn_tolerance: m and rad within which base and hand are there.
       limit: agent steps. after: reason of the failure where the limit passes first; "": the next phase begins.
       speed: m of the hand, or of the base where no hand moves, in an agent step.
+      rise: m by which the body of a base that hovers is above its height; None: as it was.
     """
 
     base: Base = Base.STAY
@@ -78,6 +79,7 @@ class Phase:
     limit: int = LIMIT
     after: str = "timeout"
     speed: float | None = None
+    rise: float | None = None
 
 
 REASON_NUMBERS = ("", *REASONS)
@@ -86,7 +88,8 @@ REASON_NUMBERS = ("", *REASONS)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Programs:
-    """Programs of a batch; the fields are those of `Phase`, and a world's phases from `length` on do not count."""
+    """Programs of a batch; the fields are those of `Phase`, and a world's phases from `length` on do not count. `rise`
+    is NaN for None."""
 
     length: Int[np.ndarray, "W"]
     base: Int[np.ndarray, "W P"]
@@ -108,6 +111,7 @@ class Programs:
     limit: Int[np.ndarray, "W P"]
     after: Int[np.ndarray, "W P"]
     speed: Float[np.ndarray, "W P"]
+    rise: Float[np.ndarray, "W P"]
 
     @classmethod
     def pack(cls, programs: Sequence[Sequence[Phase]]) -> Programs:
@@ -139,6 +143,7 @@ class Programs:
             limit=column(lambda p: p.limit, np.int32),
             after=column(lambda p: REASON_NUMBERS.index(p.after), np.int32),
             speed=column(lambda p: p.speed or (HAND_SPEED if p.hand >= 0 else SPEED), np.float32),
+            rise=column(lambda p: np.nan if p.rise is None else p.rise, np.float32),
         )
 
     def at(self, phase: Int[np.ndarray, "W"]) -> dict[str, np.ndarray]:

@@ -21,7 +21,7 @@ from ig2mj.planning.moves import (
     travel,
     vector3,
 )
-from ig2mj.planning.opening import open_into
+from ig2mj.planning.opening import Tried, open_into
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import BODY, PlannedWorld, Spot, Stance
@@ -39,7 +39,7 @@ def place(predicate: str, until: str = "") -> Callable[[PlannedWorld, Step], Pri
     def place(world: PlannedWorld, step: Step) -> Primitive:
         name, where = step.arguments
         hand_with(world, name)
-        reason, detail = "no_base", ""
+        reason, detail, opened = "no_base", "", Tried()
         for attempt in range(ATTEMPTS):
             if name not in world.held:  # it fell, or was put where the relation is false
                 again = yield from grasp(world, Step("grasp", (name,)))
@@ -50,7 +50,7 @@ def place(predicate: str, until: str = "") -> Callable[[PlannedWorld, Step], Pri
             if isinstance(found, str):
                 reason = "no_path" if found == _NO_WAY else "no_base"
                 detail = f"{found} {predicate}({name}, {where}) would be true"
-                if predicate == "inside" and (yield from open_into(world, where, attempt)):
+                if predicate == "inside" and (yield from open_into(world, where, opened)):
                     continue
                 break
             stance, spot = found
@@ -89,6 +89,15 @@ def place(predicate: str, until: str = "") -> Callable[[PlannedWorld, Step], Pri
         return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
     return place
+
+
+def bring_out(world: PlannedWorld, name: str) -> Primitive:
+    """Puts an object onto open floor of the room where it is."""
+    if name not in world.held:
+        taken = yield from grasp(world, Step("grasp", (name,)))
+        if not taken.done:
+            return taken
+    return (yield from place("on_floor")(world, Step("place_on_floor", (name, world.facts.room(name)))))
 
 
 _NO_SPOT, _NO_STANCE = "there is no room for a place where", "no free floor is in reach of a place where"

@@ -13,10 +13,10 @@ from ig2mj.planning.bodies import WheeledBody
 from ig2mj.planning.cleaning import clean
 from ig2mj.planning.doors import naming_doors
 from ig2mj.planning.driving import drive_near, go
-from ig2mj.planning.grasping import grasp, release
+from ig2mj.planning.grasping import grasp, is_graspable, release
 from ig2mj.planning.moves import Primitive, PrimitiveFailed
 from ig2mj.planning.opening import set_open
-from ig2mj.planning.placing import place
+from ig2mj.planning.placing import bring_out, place
 from ig2mj.planning.pushing import push
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
@@ -26,7 +26,24 @@ from ig2mj.planning.world import AWAY, PlannedWorld
 
 def primitive(world: PlannedWorld, step: Step) -> Primitive:
     """What a robot does for a step."""
-    return naming_doors(world, step, _guarded(ACTIONS[step.primitive](world, step)))
+    return naming_doors(world, step, _tried_again(world, step))
+
+
+BROUGHT_OUT = ("open", "close", "toggle_on", "toggle_off", "wipe", "scrub", "slice")
+"""Primitives that are tried again on open floor, with things that can be carried there."""
+
+
+def _tried_again(world: PlannedWorld, step: Step) -> Primitive:
+    """A primitive; what can be carried is brought out into the open where it fails, once."""
+    action, name = ACTIONS[step.primitive], step.object
+    outcome = yield from _guarded(action(world, step))
+    if outcome.done or step.primitive not in BROUGHT_OUT or outcome.reason == "timeout":
+        return outcome
+    if world.domain.fixed(name) or not is_graspable(world, name) or (name not in world.held and all(world.held)):
+        return outcome
+    if (yield from _guarded(bring_out(world, name))).done:
+        outcome = yield from _guarded(action(world, step))
+    return outcome
 
 
 def _guarded(inner: Primitive) -> Primitive:

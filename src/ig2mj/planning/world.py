@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from ig2mj.agents.humanoid.frames import BODY_HEIGHT
 from ig2mj.agents.humanoid.robot import BODY_RADIUS
@@ -21,6 +21,7 @@ from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.footprint import BaseFootprint
 from ig2mj.planning.motion_planner import NEAR_START, FreeFloor, MotionPlanner
+from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.stage import Stage
 from ig2mj.predicates.literals import object_index, room_index
 from ig2mj.sampling.placement import Placer
@@ -49,17 +50,28 @@ SIDEWAYS = 0.4
 (iGibson's behavior_robot.py), is behind the body's axis and to the side, so that the hand reaches 0.3 m farther than
 ahead."""
 
-RESTING = (0.56, 0.8, 0.33)
-"""m: heights of the hands at rest, and how far from the body's axis they reach."""
+RESTING, TUCKED = (0.56, 0.8, 0.33), (0.5, 0.85, 0.22)
+"""m: heights of the hands at rest, and how far from the body's axis they reach; the same of hands whose fingers point
+up."""
+
+RISE, EFFORT = (-0.3, 0.25), 1.0
+"""m by which the body stoops, and stretches, for what its hands do not reach otherwise; m of way that a metre of it
+counts as."""
 
 AWAY, FARTHEST = 0.55, 0.95
 """m, horizontal, that a base would like to be from what its hand does, and from where it puts what is large."""
 
+EASY = 0.35
+"""m, horizontal, from the floor where a robot can stand up to which no spot is harder to reach than another."""
+
 WALL = 0.02
 """m before a point from which on a wall does not count: a switch is on it."""
 
-EACH = 3
-"""Spots of a placement in each area of its rule."""
+EACH, SPREAD = 4, 0.04
+"""Spots of a placement in each area of its rule, and m between them, at least."""
+
+LATER_SPOTS = 12
+"""Candidates of an area of which the predicate is asked, at most."""
 
 TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 """rad about the vertical that an object may be turned by, from how it is held in front of the robot."""
@@ -75,10 +87,11 @@ Rotation = Float[np.ndarray, "3 3"]
 
 @dataclasses.dataclass(frozen=True)
 class Stance:
-    """Where a robot stands to do something: x, y (m) and yaw (rad)."""
+    """Where a robot stands to do something: x, y (m), yaw (rad), and how far it stretches or stoops (m)."""
 
     xy: tuple[float, float]
     yaw: float
+    rise: float = 0.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -179,7 +192,7 @@ class PlannedWorld:
     def stance(self) -> Stance:
         """Where the robot stands now."""
         (x, y), yaw = self.base
-        return Stance((float(x), float(y)), yaw)
+        return Stance((float(x), float(y)), yaw, float(self.senses.base_pos[self.world, 2]) - self.body.stands)
 
     def vertices(self, name: str) -> Float[np.ndarray, "V 3"]:
         """Corners of an object's collision pieces, world frame."""
@@ -255,17 +268,17 @@ class PlannedWorld:
         frame = frame if rotation is None else rotation @ frame
         return frame[:, 1] * (1.0 if hand == 0 else -1.0), frame[:, 2]
 
-    def floor(self, holding: bool = False) -> FreeFloor:
+    def floor(self, holding: bool = False, reaching: bool = False) -> FreeFloor:
         """Where the robot can stand, without regard to what it holds.
 
         Args:
-          holding: in any direction with what it holds.
+          holding: in any direction with what it holds. reaching: empty hands are where they rest, not tucked.
         """
         view, number, hands = self.view, self.world, self.body.hands
         held = [n if n and not self.domain.fixed(n) else "" for n in self.held]
         footprint = BaseFootprint.of_robot(self.stage.scene, view, self.stage.agent, number, hands.tolist())
         if not all(held):
-            footprint = footprint.holding(*RESTING)
+            footprint = footprint.holding(*(RESTING if reaching else TUCKED))
         here, _ = self.base
         for hand, name in enumerate(held):
             if holding and name:
@@ -318,12 +331,12 @@ class PlannedWorld:
         """A point of the body's frame, if the robot stood there."""
         c, s = np.cos(stance.yaw), np.sin(stance.yaw)
         x, y, z = point
-        height = float(self.senses.base_pos[self.world, 2])
+        height = self.body.stands + stance.rise
         return np.array([stance.xy[0] + c * x - s * y, stance.xy[1] + s * x + c * y, height + z])
 
     def reaches(self, hand: int, stance: Stance, point: Vector) -> bool:
         """Whether a hand reaches a point from a stance."""
-        return bool(self._reach_from(hand, np.array([stance.xy]), np.array([stance.yaw]), point)[0])
+        return bool(np.linalg.norm(point - self._from(self.body.shoulders[hand], stance)) <= self.body.reach)
 
     def stances(
         self,
@@ -355,17 +368,28 @@ class PlannedWorld:
         cost = 0.6 * way + 2.0 * np.abs(apart - away) - 0.5 * np.minimum(floor.spare[tuple(cells.T)], 0.2)
         cost, middles = np.concatenate([cost, cost + SIDEWAYS]), np.concatenate([middles, middles])
         target = point if held is None else point + _turned_vectors(yaw, held)
-        cost[~self._reach_from(hand, middles, yaw, target)] = np.inf
+        rise = self._rise_from(hand, middles, yaw, target)
+        cost += np.where(np.isnan(rise), np.inf, EFFORT * np.abs(rise))
         count, obstacles = 0, self.obstacles()
         while len(cost) and np.isfinite(cost[best := int(np.argmin(cost))]):
-            if self._behind_wall(obstacles, middles[best], point):
+            if self._behind_wall(obstacles, middles[best], point) or not self._stretches(
+                obstacles, middles[best], rise[best]
+            ):
                 cost[best] = np.inf
                 continue
             cost[np.linalg.norm(middles - middles[best], axis=1) < APART] = np.inf
-            yield Stance((float(middles[best][0]), float(middles[best][1])), float(yaw[best]))
+            yield Stance((float(middles[best][0]), float(middles[best][1])), float(yaw[best]), float(rise[best]))
             count += 1
             if count == most:
                 return
+
+    def _stretches(self, obstacles: Obstacles, xy: Float[np.ndarray, "2"], rise: float) -> bool:
+        """Whether there is room above a body that stretches."""
+        if rise <= 0.0:
+            return True
+        top = self.body.stands + BODY_HEIGHT - BODY_RADIUS
+        points = np.array([[*xy, top], [*xy, top + rise]])
+        return bool((obstacles.distance(points) > BODY_RADIUS).all())
 
     def _behind_wall(self, obstacles: Obstacles, xy: Float[np.ndarray, "2"], point: Vector) -> bool:
         """Whether a wall stands between a robot and a point."""
@@ -384,15 +408,18 @@ class PlannedWorld:
         tables = self.domain.model.tables
         return [o for o, c in enumerate(tables.object_categories) if c == "walls"]
 
-    def _reach_from(
+    def _rise_from(
         self, hand: int, xy: Float[np.ndarray, "n 2"], yaw: Float[np.ndarray, "n"], point: Float[np.ndarray, "*n 3"]
-    ) -> Bool[np.ndarray, "n"]:
-        """Whether a hand reaches a point from each of some stances."""
+    ) -> Float[np.ndarray, "n"]:
+        """How far the body rises so that a hand reaches a point from each of some stances, m; NaN: it does not."""
         x, y, z = self.body.shoulders[hand]
         c, s = np.cos(yaw), np.sin(yaw)
-        height = np.full(len(xy), float(self.senses.base_pos[self.world, 2]) + z)
-        shoulder = np.stack([xy[:, 0] + c * x - s * y, xy[:, 1] + s * x + c * y, height], axis=1)
-        return np.linalg.norm(point - shoulder, axis=1) <= self.body.reach
+        shoulder = np.stack([xy[:, 0] + c * x - s * y, xy[:, 1] + s * x + c * y], axis=1)
+        away = np.linalg.norm(point[..., :2] - shoulder, axis=1)
+        above = point[..., 2] - (self.body.stands + z)
+        span = np.sqrt(np.maximum(self.body.reach**2 - away**2, 0.0))
+        rise = np.sign(above) * np.maximum(np.abs(above) - span, 0.0)
+        return np.where((away <= self.body.reach) & (rise >= RISE[0]) & (rise <= RISE[1]), rise, np.nan)
 
     def dirt(self, predicate: str, name: str) -> list[DirtSpot]:
         """Particles that are left on an object: of dust for "dusty", of stains for "stained"; the nearest first."""
@@ -415,22 +442,52 @@ class PlannedWorld:
         index = self.index(name)
         second = room_index(self.domain.model, where) if predicate == "on_floor" else self.index(where)
         areas = PLACEMENTS[predicate](self.query, index, second)
-        placer = Placer(self.query)
+        placer, farther = Placer(self.query), self._out_of_reach()
+        middle = self._middle_of_fixed_part(where) if predicate == "inside" else None
         for quat in self._upright(name):
             for angle in TURNS:
                 new = _yawed(quat, angle)
                 for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
-                    found = 0
-                    positions = placer.spots(index, areas, new, self.rng, support, each=EACH)
-                    if predicate == "inside":  # away from where doors shut
-                        middle = self._middle_of_fixed_part(where)
-                        positions = sorted(positions, key=lambda pos: float(np.linalg.norm((pos - middle)[:2])))
-                    for pos in positions:
+                    found, asked = list[Vector](), 0
+                    positions = np.array(list(placer.spots(index, areas, new, self.rng, support))).reshape(-1, 3)
+                    cost = farther(positions)
+                    if middle is not None:  # away from where doors shut
+                        cost += np.linalg.norm((positions - middle)[:, :2], axis=1)
+                    for k in np.argsort(cost, kind="stable"):
+                        pos = positions[k]
+                        if not np.isfinite(cost[k]) or len(found) == EACH or asked == LATER_SPOTS:
+                            break
+                        if any(np.linalg.norm(pos - other) < SPREAD for other in found):
+                            continue
+                        asked += 1
                         if predicate in ("on_top", "on_floor") or self._would_hold(predicate, name, where, pos, new):
-                            found += 1
+                            found.append(pos)
                             yield Spot(pos, new)
                     if found:
                         break
+
+    def _out_of_reach(self) -> Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n"]]:
+        """How far positions are from where a hand is comfortable, m, for a robot on floor that it has a way to;
+        infinite: no hand reaches there."""
+        import scipy.ndimage  # takes long to import
+
+        floor, (here, _) = self.floor(), self.base
+        reached = np.isfinite(floor.distances(here, NEAR_START))
+        apart = np.full(reached.shape, np.inf)
+        if reached.any():
+            apart = RESOLUTION * np.asarray(scipy.ndimage.distance_transform_edt(~reached))
+        shoulder = self.body.stands + self.body.shoulders[0][2]
+
+        def farther(pos: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
+            if not len(pos):
+                return np.zeros(0)
+            cells = np.clip(floor.occupancy.cells(pos[:, :2]), 0, np.array(reached.shape) - 1)
+            away = apart[tuple(np.moveaxis(cells, -1, 0))]
+            above = pos[:, 2] - shoulder
+            far = np.hypot(away, above - np.clip(above, *RISE)) > self.body.reach
+            return np.where(far, np.inf, np.maximum(away - EASY, 0.0))
+
+        return farther
 
     def _middle_of_fixed_part(self, name: str) -> Vector:
         """Of an object without its doors, drawers and lids: middle of its box, m."""
