@@ -23,7 +23,7 @@ from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
-from ig2mj.planning.world import BODY, DirtSpot, PlannedWorld, Rotation, Stance, Vector, about_vertical
+from ig2mj.planning.world import BODY, DirtSpot, PlannedWorld, Rotation, Stance, Vector, about_vertical, turn_onto
 
 ROUNDS, STROKES = 24, 8
 """Stances from which an object is cleaned, and places of the tool for each, at most."""
@@ -140,7 +140,7 @@ def _regions(world: PlannedWorld, tool: str, hand: int, stance: Stance, normal: 
     area, out = _area(world, tool)
     points = (world.vertices(tool) if area is None else area) - world.grip(hand)
     carried = about_vertical(stance.yaw - world.base[1])
-    rotations = [carried] if area is None else [_turn_onto(carried @ out, -normal) @ carried, carried]
+    rotations = [carried] if area is None else [turn_onto(carried @ out, -normal) @ carried, carried]
     return [_Region(r, (points @ r.T).min(0), (points @ r.T).max(0)) for r in rotations]
 
 
@@ -165,18 +165,6 @@ def _is_covered(world: PlannedWorld, tool: str, hand: int) -> bool:
     """Whether the hand is on the side of a tool that cleans."""
     area, out = _area(world, tool)
     return area is not None and float(world.hand_axes(hand)[1] @ out) < -COVERED
-
-
-def _turn_onto(one: Vector, other: Vector) -> Rotation:
-    """The least rotation from one direction to another."""
-    a, b = one / np.linalg.norm(one), other / np.linalg.norm(other)
-    axis, cos = np.cross(a, b), float(a @ b)
-    if cos < -0.999:
-        side = np.cross(a, UP) if abs(a @ UP) < 0.9 else np.array([1.0, 0.0, 0.0])
-        side = side / np.linalg.norm(side)
-        return 2 * np.outer(side, side) - np.eye(3)
-    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + k + k @ k / (1 + cos)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

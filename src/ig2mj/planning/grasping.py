@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 
 import numpy as np
 
@@ -33,6 +33,12 @@ from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
 LIFT = 0.03
 """m that an object is lifted before it is drawn sideways."""
 
+Prefers = Callable[[GraspPose], float]
+"""How good a pose is, for those who want a certain one."""
+
+CLEARLY = 0.05
+"""By which a pose has to be better than another to come before it."""
+
 POSES, WAYS = 6, 40
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
 
@@ -41,8 +47,10 @@ NEAREST = 200
 """Cells of the floor that are compared to find the edge of an object that is nearest to it."""
 
 
-def grasp(world: PlannedWorld, step: Step) -> Primitive:
-    """The hand goes onto a side of the object that has room for it, until it holds it."""
+def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Primitive:
+    """The hand goes onto a side of the object that has room for it, until it holds it; of sides that `prefers` finds
+    better by at least `CLEARLY`, these first.
+    """
     name = step.object
     if name in world.held:
         return Outcome()
@@ -51,9 +59,9 @@ def grasp(world: PlannedWorld, step: Step) -> Primitive:
     reason, detail, tried, moved = "no_grasp", "", list[GraspPose](), Tried()
     for attempt in range(ATTEMPTS):
         hand = free_hand(world, attempt)
-        found = _plan(world, name, hand, tried)
+        found = _plan(world, name, hand, tried, prefers)
         while found is None and (yield from open_around(world, name, moved)):
-            found = _plan(world, name, hand, tried)
+            found = _plan(world, name, hand, tried, prefers)
         if found is None:
             reason, detail = "no_base", f"no free floor from which a hand has a way to {name}"
             continue
@@ -113,7 +121,9 @@ def entries(pose: GraspPose, yaw: float) -> list[Vector]:
     return [-ahead(yaw), -pose.palm, UP]
 
 
-def _plan(world: PlannedWorld, name: str, hand: int, tried: Sequence[GraspPose]) -> tuple[Stance, GraspPose] | None:
+def _plan(
+    world: PlannedWorld, name: str, hand: int, tried: Sequence[GraspPose], prefers: Prefers | None = None
+) -> tuple[Stance, GraspPose] | None:
     """A stance and a pose from which the hand has a way, the most comfortable first; later attempts take others."""
     obstacles, floor = world.obstacles([name]), world.floor()
     poses = [p for p in grasp_poses(world, name, obstacles) if not any(_alike(p, t) for t in tried)]
@@ -125,6 +135,8 @@ def _plan(world: PlannedWorld, name: str, hand: int, tried: Sequence[GraspPose])
         for point in (world.com(name), *points[_spread(points, world.com(name))], _nearest(world, floor, points)):
             for stance in world.stances(hand, point, floor, AWAY):
                 near = [p for p in ordered(poses, stance.yaw) if world.reaches(hand, stance, p.at(p.before))]
+                if prefers is not None:
+                    near.sort(key=lambda p: -round(prefers(p) / CLEARLY))
                 yield from ((stance, pose) for pose in near[:POSES])
 
     def has_way(candidate: tuple[Stance, GraspPose], search: bool) -> bool:

@@ -34,6 +34,12 @@ AT_OBJECT = 0.4
 APART = 0.03
 """m between points of a side."""
 
+HIGH = 0.75
+"""Share of an object's height at which its sides are taken, too: a hand has room there above the floor."""
+
+OUTER = 0.8
+"""Share of the way from an object's centre of mass to its rim at which it is taken, too."""
+
 MIDDLES = 8
 """Pieces whose middles are aimed at, at most."""
 
@@ -90,7 +96,8 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     centre, corners = world.com(name), world.vertices(name)
     middles = [world.vertices_of_pieces(np.array([p])).mean(0) for p in np.flatnonzero(tables.piece_object == index)]
     middles.sort(key=lambda m: float(np.linalg.norm(m - centre)))
-    aims = np.array([centre, *middles[:MIDDLES]])
+    above = np.array([*centre[:2], corners[:, 2].min() + HIGH * np.ptp(corners[:, 2])])
+    aims = np.array([centre, above, *middles[:MIDDLES], *(centre + OUTER * (world.rim(name) - centre))])
     size = float(np.linalg.norm(np.ptp(corners, axis=0))) + 0.1
     normals = np.array([normal for normal, _ in _SIDES])
     origins = aims[None] + size * normals[:, None]

@@ -49,6 +49,9 @@ class PrimitiveFailed(Exception):
 # Hands.
 
 
+OVER = 0.035
+"""m above where an object is put down from which on it is lowered."""
+
 ENTRIES = (0.2, 0.35, 0.5)
 """m before a goal to which a hand goes first where it finds no way to the goal itself."""
 
@@ -68,6 +71,11 @@ def hand_path(
       entries: unit vectors from the goal, along which a hand comes straight to it where nothing else is free.
       search: ways around obstacles are searched for (`ig2mj.planning.hand_search`), where via points find none.
     """
+    if spare > 0.0:  # what is put down comes to right above its place first
+        over = goal + OVER * UP
+        way = hand_path(obstacles, spheres, start, over, entries, search=search)
+        if way is not None:
+            return [*way, goal]
     way = hand_way(obstacles, spheres, start, goal, spare)
     if way is not None:
         return way

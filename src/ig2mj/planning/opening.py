@@ -92,28 +92,30 @@ Tried = collections.Counter[str]
 
 
 def open_around(world: PlannedWorld, name: str, tried: Tried) -> Generator[Program, str, bool]:
-    """Opens a door or drawer that may keep a hand from an object, the nearest first; where all are open, shuts a drawer
-    that the object is not in. Returns whether there was one that has not been tried `TRIES` times."""
+    """Opens the drawer that an object is in, else doors in front of it, the nearest first; where all are open, shuts
+    drawers that it is not in. Returns whether there was one that has not been tried `TRIES` times."""
     found = [j for c in world.facts.containers(name) if world.domain.opens(c) for j in joints_of(world, c)]
     near = world.com(name)
     found.sort(key=lambda j: float(np.linalg.norm(j.vertices.mean(0) - near)))
-    return (yield from _move_one(world, found, near, tried))
+    around = [j for j in found if not j.hinge and j.surrounds(near)]
+    opened = around or [j for j in found if j.hinge] or found
+    return (yield from _move_one(world, opened, [] if around else [j for j in found if not j.hinge], tried))
 
 
 def open_into(world: PlannedWorld, where: str, tried: Tried) -> Generator[Program, str, bool]:
     """Opens a door or drawer of a container, the largest first; arguments and result as of `open_around`."""
     found = joints_of(world, where) if world.domain.opens(where) else []
-    return (yield from _move_one(world, found, None, tried))
+    return (yield from _move_one(world, found, [], tried))
 
 
 def _move_one(
-    world: PlannedWorld, joints: list[OpenableJoint], near: Vector | None, tried: Tried
+    world: PlannedWorld, opened: list[OpenableJoint], closed: list[OpenableJoint], tried: Tried
 ) -> Generator[Program, str, bool]:
+    """Opens the first that is not wide open, else shuts the first that is open."""
     if all(world.held):
         return False
-    shut = [j for j in joints if j.fraction < WIDE and tried[j.name] < TRIES]
-    out = [j for j in joints if near is not None and not j.hinge and j.fraction > AJAR and not j.surrounds(near)]
-    out = [j for j in out if tried[f"{j.name} shut"] < TRIES]
+    shut = [j for j in opened if j.fraction < WIDE and tried[j.name] < TRIES]
+    out = [j for j in closed if j.fraction > AJAR and tried[f"{j.name} shut"] < TRIES]
     if not shut and not out:
         return False
     joint, opens = (shut[0], True) if shut else (out[0], False)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 
+import numpy as np
+
+from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp
 from ig2mj.planning.moves import (
@@ -12,6 +15,7 @@ from ig2mj.planning.moves import (
     RETREAT,
     UP,
     Primitive,
+    Program,
     ahead,
     first_way,
     hand_path,
@@ -33,12 +37,18 @@ STANCES, WAYS = 4, 60
 """Stances for each spot, and ways of a hand that are looked for, at most."""
 
 
-def place(predicate: str, until: str = "") -> Callable[[PlannedWorld, Step], Primitive]:
-    """The primitive that makes a placement true; `until`: the relation that ends it, if it is another."""
+def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[[PlannedWorld, Step], Primitive]:
+    """The primitive that makes a placement true.
+
+    Args:
+      until: the relation that ends it, if it is another. turns_over: where the hand has no way, it takes the object by
+        another side, once.
+    """
 
     def place(world: PlannedWorld, step: Step) -> Primitive:
         name, where = step.arguments
         hand_with(world, name)
+        turned_over = not turns_over
         reason, detail, opened = "no_base", "", Tried()
         for attempt in range(ATTEMPTS):
             if name not in world.held:  # it fell, or was put where the relation is false
@@ -51,6 +61,9 @@ def place(predicate: str, until: str = "") -> Callable[[PlannedWorld, Step], Pri
                 reason = "no_path" if found == _NO_WAY else "no_base"
                 detail = f"{found} {predicate}({name}, {where}) would be true"
                 if predicate == "inside" and (yield from open_into(world, where, opened)):
+                    continue
+                if found == _NO_WAY and not turned_over and (yield from _regrasp(world, name, hand)):
+                    turned_over = True
                     continue
                 break
             stance, spot = found
@@ -89,6 +102,19 @@ def place(predicate: str, until: str = "") -> Callable[[PlannedWorld, Step], Pri
         return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
     return place
+
+
+def _regrasp(world: PlannedWorld, name: str, hand: int) -> Generator[Program, str, bool]:
+    """Puts down what a hand holds, and takes it by its rim, as far as possible from where the hand had it."""
+    pos, quat = world.pose(name)
+    before = matrices_on_host(quat[None])[0].T @ (world.grip(hand) - pos)
+    put = yield from place("on_floor", turns_over=False)(world, Step("place_on_floor", (name, world.facts.room(name))))
+    if not put.done:
+        return False
+    pos, quat = world.pose(name)
+    there = pos + matrices_on_host(quat[None])[0] @ before
+    taken = yield from grasp(world, Step("grasp", (name,)), lambda pose: float(np.linalg.norm(pose.point - there)))
+    return taken.done
 
 
 def bring_out(world: PlannedWorld, name: str) -> Primitive:

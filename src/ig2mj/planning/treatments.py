@@ -23,7 +23,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import AWAY, BODY, PlannedWorld, Stance, Vector, about_vertical
+from ig2mj.planning.world import AWAY, BODY, PlannedWorld, Rotation, Stance, Vector, about_vertical, turn_onto
 from ig2mj.scene.tables import LinkKind
 
 
@@ -49,50 +49,70 @@ def _hold_at(
     """Brings a held object's centre of mass, or an annotated link of it, to the first of some points that the hand has
     a way to, with the robot standing anywhere; returns the reason why it did not, and the way."""
 
-    def part(share: float) -> Vector:
-        if link >= 0:
-            return np.asarray(world.view.link_pos)[world.world, link].astype(float)
-        out = ahead(world.base[1])
-        far = float(((world.vertices(name) - world.com(name)) @ out).max())
-        return world.com(name) + share * far * out
-
     for _ in range(ATTEMPTS):
         obstacles, floor, now = world.obstacles([name]), world.floor(), world.base[1]
-        offsets = {share: world.grip(hand) - part(share) for share in (PARTS if link < 0 else PARTS[:1])}
+        offsets = _offsets(world, name, hand, link)
 
         def candidates(floor=floor, now=now, offsets=offsets) -> Iterator[_Holding]:
-            for share, offset in offsets.items():
+            for offset, tilt in offsets:
                 held = about_vertical(-now) @ offset
                 for point in points:
                     for stance in world.stances(hand, point, floor, AWAY, STANCES, held):
-                        yield stance, point, share
+                        yield stance, point, offset, tilt
 
-        def has_way(candidate: _Holding, search: bool, obstacles=obstacles, now=now, offsets=offsets) -> bool:
-            stance, point, share = candidate
-            rotation = about_vertical(stance.yaw - now)
-            spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+        def has_way(candidate: _Holding, search: bool, obstacles=obstacles, now=now) -> bool:
+            stance, point, offset, tilt = candidate
+            turn = about_vertical(stance.yaw - now)
+            spheres = _spheres(world, name, hand, turn @ tilt)
             standing, start = obstacles.about(stance.xy, *BODY), world.carried(hand, stance)
-            target, back = point + rotation @ offsets[share], [UP, -ahead(stance.yaw)]
+            target, back = point + turn @ offset, [UP, -ahead(stance.yaw)]
             return hand_path(standing, spheres, start, target, back, search=search) is not None
 
         found = first_way(candidates(), has_way, WAYS)
         if found is None:
             return "no_path", []
-        stance, point, share = found
-        turned = about_vertical(stance.yaw - now) @ offsets[share]
+        stance, point, offset, tilt = found
+        target = point + about_vertical(stance.yaw - now) @ offset
+        turned = about_vertical(stance.yaw - now) @ tilt @ about_vertical(now - stance.yaw)
         if (yield from go(world, stance)):
             continue
-        target = point + turned
-        spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
         back, obstacles = [UP, -ahead(world.base[1])], world.obstacles([name], world.stance)
-        way = hand_path(obstacles, spheres, world.grip(hand), target, back, search=True)
+        way = hand_path(obstacles, _spheres(world, name, hand, turned), world.grip(hand), target, back, search=True)
         if way is not None:
-            return (yield travel(hand, way, None, keeps=world.index(name))), way
+            quat, keeps = world.turned_hand(hand, turned), world.index(name)
+            turns = Phase(hand=hand, pos=vector3(world.grip(hand)), quat=quat, keeps=keeps, tolerance=0.05, limit=30,
+                          after="")  # fmt: skip
+            return (yield [turns, *travel(hand, way, quat, keeps=keeps)]), way
     return "no_path", []
 
 
-_Holding = tuple[Stance, Vector, float]
-"""Where the robot stands, where a part of what it holds is to be, and which part."""
+def _spheres(world: PlannedWorld, name: str, hand: int, rotation: Rotation) -> np.ndarray:
+    return world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+
+
+def _offsets(world: PlannedWorld, name: str, hand: int, link: int) -> list[tuple[Vector, Rotation]]:
+    """From parts of a held object to the hand's grasp point, m, with the rotations by which the hand is turned: an
+    annotated link, else the middle and what is far ahead. What is long is also held so that it points ahead."""
+    grip, out = world.grip(hand), ahead(world.base[1])
+    if link >= 0:
+        return [(grip - np.asarray(world.view.link_pos)[world.world, link].astype(float), np.eye(3))]
+    corners, centre = world.vertices(name) - grip, world.com(name) - grip
+    tilts = [np.eye(3)]
+    if np.linalg.norm(centre) > LONG:
+        tilts.append(turn_onto(centre, out))
+    found = []
+    for tilt in tilts:
+        far = float(((corners - centre) @ tilt.T @ out).max())
+        found += [(-(tilt @ centre + share * far * out), tilt) for share in PARTS]
+    return found
+
+
+_Holding = tuple[Stance, Vector, Vector, Rotation]
+"""Where the robot stands, where a part of what it holds is to be, the way from there to the hand, and how it is
+turned."""
+
+LONG = 0.07
+"""m from the hand to the centre of mass of what it holds, from which on that is also held so that it points ahead."""
 
 PARTS = (0.0, 0.6, 0.85)
 """Parts of a held object that are tried: shares of the way from its centre of mass to its end away from the robot."""

@@ -556,6 +556,18 @@ def about_vertical(angle: float) -> Rotation:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def turn_onto(one: Vector, other: Vector) -> Rotation:
+    """The least rotation from one direction to another."""
+    a, b = one / np.linalg.norm(one), other / np.linalg.norm(other)
+    axis, cos = np.cross(a, b), float(a @ b)
+    if cos < -0.999:
+        side = np.cross(a, UP) if abs(a @ UP) < 0.9 else np.array([1.0, 0.0, 0.0])
+        side = side / np.linalg.norm(side)
+        return 2 * np.outer(side, side) - np.eye(3)
+    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + k + k @ k / (1 + cos)
+
+
 def _turn(angle: float) -> Float[np.ndarray, "4"]:
     return np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
 
