@@ -37,13 +37,16 @@ def _tried_again(world: PlannedWorld, step: Step) -> Primitive:
     """A primitive; what can be carried is brought out into the open where it fails, once."""
     action, name = ACTIONS[step.primitive], step.object
     outcome = yield from _guarded(action(world, step))
-    if outcome.done or step.primitive not in BROUGHT_OUT or outcome.reason == "timeout":
+    if outcome.done or step.primitive not in BROUGHT_OUT or outcome.reason in ("slipped", "timeout"):
         return outcome
     if world.domain.fixed(name) or not is_graspable(world, name) or (name not in world.held and all(world.held)):
         return outcome
-    if (yield from _guarded(bring_out(world, name))).done:
-        outcome = yield from _guarded(action(world, step))
-    return outcome
+    if not (yield from _guarded(bring_out(world, name))).done:
+        return outcome
+    tool = step.arguments[-1]
+    if tool != name and tool not in world.held and not (yield from _guarded(grasp(world, Step("grasp", (tool,))))).done:
+        return outcome
+    return (yield from _guarded(action(world, step)))
 
 
 def _guarded(inner: Primitive) -> Primitive:

@@ -103,7 +103,8 @@ def _offsets(world: PlannedWorld, name: str, hand: int, link: int) -> list[tuple
     found = []
     for tilt in tilts:
         far = float(((corners - centre) @ tilt.T @ out).max())
-        found += [(-(tilt @ centre + share * far * out), tilt) for share in PARTS]
+        higher = float(np.ptp(corners[:, 2]) - np.ptp((corners @ tilt.T)[:, 2])) / 2  # its top is where it would be
+        found += [(-(tilt @ centre + share * far * out) + higher * UP, tilt) for share in PARTS]
     return found
 
 
@@ -132,7 +133,7 @@ def soak(world: PlannedWorld, step: Step) -> Primitive:
     here, _ = world.base
     back = np.array([*(here - source[:2]), 0.0])
     back /= max(float(np.linalg.norm(back)), 1e-6)
-    points = [source - np.array([0, 0, below + half]) + out * back for out in (0.0, 0.05) for below in BELOW_TAP]
+    points = [source - np.array([0, 0, below + half]) + out * back for out in (0.0, 0.05, 0.09) for below in BELOW_TAP]
     reason, way = yield from _hold_at(world, name, hand, points)
     if reason:
         return Outcome(reason, f"the hand has no way with {name} below {tap}")
