@@ -476,7 +476,7 @@ class PlannedWorld:
         apart = np.full(reached.shape, np.inf)
         if reached.any():
             apart = RESOLUTION * np.asarray(scipy.ndimage.distance_transform_edt(~reached))
-        shoulder = self.body.stands + self.body.shoulders[0][2]
+        _, aside, shoulder = np.abs(self.body.shoulders[0]) + (0.0, 0.0, self.body.stands)
 
         def farther(pos: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
             if not len(pos):
@@ -484,7 +484,8 @@ class PlannedWorld:
             cells = np.clip(floor.occupancy.cells(pos[:, :2]), 0, np.array(reached.shape) - 1)
             away = apart[tuple(np.moveaxis(cells, -1, 0))]
             above = pos[:, 2] - shoulder
-            far = np.hypot(away, above - np.clip(above, *RISE)) > self.body.reach
+            level = np.maximum(away - aside, 0.0)
+            far = np.hypot(level, above - np.clip(above, *RISE)) > self.body.reach
             return np.where(far, np.inf, np.maximum(away - EASY, 0.0))
 
         return farther
