@@ -476,7 +476,8 @@ class PlannedWorld:
         apart = np.full(reached.shape, np.inf)
         if reached.any():
             apart = RESOLUTION * np.asarray(scipy.ndimage.distance_transform_edt(~reached))
-        _, aside, shoulder = np.abs(self.body.shoulders[0]) + (0.0, 0.0, self.body.stands)
+        _, aside, height = np.abs(self.body.shoulders[0])
+        shoulder = self.body.stands + height
 
         def farther(pos: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
             if not len(pos):
