@@ -136,7 +136,7 @@ def _plan(
             for stance in world.stances(hand, point, floor, AWAY):
                 near = [p for p in ordered(poses, stance.yaw) if world.reaches(hand, stance, p.at(p.before))]
                 if prefers is not None:
-                    near.sort(key=lambda p: -round(prefers(p) / CLEARLY))
+                    near.sort(key=_less_wanted(prefers))
                 yield from ((stance, pose) for pose in near[:POSES])
 
     def has_way(candidate: tuple[Stance, GraspPose], search: bool) -> bool:
@@ -145,6 +145,10 @@ def _plan(
         return hand_path(obstacles, spheres, world.resting(hand, stance), goal, back, search=search) is not None
 
     return first_way(candidates(), has_way, WAYS)
+
+
+def _less_wanted(prefers: Prefers) -> Callable[[GraspPose], int]:
+    return lambda pose: -round(prefers(pose) / CLEARLY)
 
 
 def _alike(one: GraspPose, other: GraspPose) -> bool:
