@@ -248,7 +248,7 @@ class Environment(StateCopies, StateImages, Configured):
         rows = np.asarray(rows)
         if rows.shape != (self.num_worlds,) or rows.min() < 0 or rows.max() >= size:
             raise EngineError(f"start_from takes {self.num_worlds} rows, each from 0 to {size - 1}")
-        starts = self.core.starts.pool.rows(rows)
+        starts = self.core.starts.bare_rows(rows)
         with GC_PAUSED:
             return self._load(self.core.engine.reset(), as_seed(seed, self.num_worlds), starts, rows.astype(np.int32))
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.engine.base import Engine
-from ig2mj.engine.model_fields import merged
+from ig2mj.engine.model_fields import ModelFields, merged
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import ActionError, EngineError
@@ -67,7 +67,14 @@ class Starts:
 
     def rows(self, row: Int[Array, "W"], key: UInt[Array, "W 2"]) -> tuple[Pool, Draw]:
         """Rows of the pool, with the fields of the model that episodes with these keys have; and what else is drawn."""
-        return self.drawn(self.pool.rows(row), key)
+        return self.drawn(self.bare_rows(row), key)
+
+    def bare_rows(self, row: Int[Array, "W"]) -> Pool:
+        """Rows of the pool without fields of the model where episodes draw them."""
+        rows = self.pool.rows(row)
+        if self._randomize is None:
+            return rows
+        return dataclasses.replace(rows, physics=dataclasses.replace(rows.physics, model_fields=ModelFields()))
 
     def drawn(self, rows: Pool, key: UInt[Array, "W 2"]) -> tuple[Pool, Draw]:
         """The same of rows from anywhere; fields of the model that they have stay."""
