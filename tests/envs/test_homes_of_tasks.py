@@ -5,16 +5,20 @@ from __future__ import annotations
 import dataclasses
 import shutil
 
+import mujoco
+import numpy as np
 import pytest
 
 import ig2mj
 from ig2mj.agents import Humanoid
+from ig2mj.engine.view import blank_view, replace_fields
 from ig2mj.errors import EngineError, InputError
 from ig2mj.scene.paths import scene_folder
 from ig2mj.scene.scene import load_scene
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.bddl.binding import BindingError
 from ig2mj.tasks.bddl.task import bddl_task
+from ig2mj.tasks.experts.quarters import quarter_turn, turned_view
 from ig2mj.tasks.homes import check_inside, in_home
 from ig2mj.tasks.registry import load_task
 
@@ -49,12 +53,55 @@ def test_what_bddl_defines_is_bound_again():
         in_home(bddl_task("bottling_fruit"), "small_home")
 
 
-def test_an_activity_of_the_paper_needs_its_furniture_where_it_is():
+def test_an_activity_without_a_fit_needs_its_furniture_where_it_is():
+    bound = dataclasses.replace(COOKING, fit=None)
     assert in_home(COOKING, COOKING.home) == COOKING
     with pytest.raises(EngineError, match=r"'small_home': it has no bottom_cabinet_1"):
-        in_home(COOKING, "small_home")
+        in_home(bound, "small_home")
     with pytest.raises(EngineError, match=r"is \d+\.\d m from its position in 'birch'"):
-        in_home(COOKING, "elm")
+        in_home(bound, "elm")
+
+
+def test_an_activity_goes_where_another_home_has_its_furniture():
+    """The robot stands before the stove, a counter in reach; its reach and its hand move with it."""
+    moved = in_home(COOKING, "small_home")
+    assert moved.home == "small_home" and moved.start[0] == "(on_top steak_0 bottom_cabinet_0)"
+    assert moved.roles == {"bottom_cabinet_1": "bottom_cabinet_0", "stove_0": "stove_0"} and moved.turned % 90 == 0
+    scene = load_scene("small_home", agents=[Humanoid(pos=moved.robots["humanoid"].pos)], objects=moved.objects)
+    data = scene.start_data()
+    stove = data.xpos[scene.tables.object_root[scene.object_index("stove_0")]]
+    robot = np.array(moved.robots["humanoid"].pos)
+    assert 0.3 < np.linalg.norm((stove - robot)[:2]) < 1.1
+    own, other = (np.array(t.near[0].pos) - t.robots["humanoid"].pos for t in (COOKING, moved))
+    assert np.linalg.norm(own) == pytest.approx(np.linalg.norm(other), abs=2e-3)
+    assert ncon_of_robot(scene) == 0
+
+
+def ncon_of_robot(scene) -> int:
+    """Contacts of the robot with anything at the start."""
+    data = mujoco.MjData(scene.model)
+    data.qpos[:] = scene.start_data().qpos
+    mujoco.mj_forward(scene.model, data)
+    robot = scene.tables.body_object[scene.model.geom_bodyid] < 0
+    robot &= np.isin(scene.model.body_rootid[scene.model.geom_bodyid], scene.tables.agent_body)
+    return sum(bool(robot[c.geom1] or robot[c.geom2]) for c in data.contact)
+
+
+def test_a_home_where_nothing_is_in_reach_says_so(tiny_home_folder):
+    with pytest.raises(EngineError, match=r"CookingMeat cannot be done in 'tiny_home': nowhere on its free floor"):
+        in_home(COOKING, tiny_home_folder)
+
+
+def test_experts_see_the_world_turned_as_at_home():
+    """A view turned by a quarter has points turned, and boxes that still are boxes."""
+    view = blank_view({axis: 2 for axis in "WOBLJAQHFY"})
+    low, high = np.array([1.0, 2.0, 0.0], np.float32), np.array([2.0, 4.0, 1.0], np.float32)
+    view = replace_fields(view, {"object_pos": view.object_pos + low, "aabb_low": view.aabb_low + low})
+    view = replace_fields(view, {"aabb_high": view.aabb_high + high})
+    seen = turned_view(view, quarter_turn(90))
+    np.testing.assert_allclose(seen.object_pos[0, 0], [-2.0, 1.0, 0.0], atol=1e-6)
+    np.testing.assert_allclose(seen.aabb_low[0, 0], [-4.0, 1.0, 0.0], atol=1e-6)
+    np.testing.assert_allclose(seen.aabb_high[0, 0], [-2.0, 2.0, 1.0], atol=1e-6)
 
 
 @pytest.mark.parametrize("pos", [(9.0, 0.0, 0.6), (0.5, 0.0, -3.0), (0.5, 0.0, 30.0)])

@@ -20,6 +20,7 @@ from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.bddl.binding import bind
 from ig2mj.tasks.bddl.task import BddlTask
 from ig2mj.tasks.navigation.task import NavigationTask
+from ig2mj.tasks.relocation import relocated
 from ig2mj.tasks.task import Task
 
 DOORWAY = 0.3
@@ -35,8 +36,8 @@ def in_home(task: AnyTask, home: str | os.PathLike) -> AnyTask:
     """The task in another home: a folder of a converted scene, or the name of a home that ships.
 
     Navigation goes into any home with a map of its floor. What BDDL defines is bound to the home's objects again. An
-    activity of the paper has robots and start states at positions of its own home, so that the furniture that it names
-    must stand there in the other one, too.
+    activity of the paper goes where it finds the furniture that it needs (`ig2mj.tasks.relocation`); one without
+    `Task.fit` needs the furniture that it names at the places of its own home.
 
     Raises:
       InputError: there is no such home. BindingError: it lacks what the activity needs. EngineError: the activity's
@@ -49,8 +50,19 @@ def in_home(task: AnyTask, home: str | os.PathLike) -> AnyTask:
         binding = bind(task.binding.activity, load_manifest(folder))
         return dataclasses.replace(task, binding=dataclasses.replace(binding, home=name))
     if isinstance(task, Task) and scene_folder(task.home) != folder:
+        if task.fit is not None and not _has_furniture(task, folder):
+            return relocated(task, home)
         _check_furniture(task, folder)
     return dataclasses.replace(task, home=name)
+
+
+def _has_furniture(task: Task, folder: pathlib.Path) -> bool:
+    """What the task names of its home is there, where it is at home."""
+    try:
+        _check_furniture(task, folder)
+    except EngineError:
+        return False
+    return True
 
 
 def _check_furniture(task: Task, folder: pathlib.Path) -> None:

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 from ig2mj.agents.registry import find_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.scene.tables import LinkKind
 from ig2mj.tasks.custom.code import TaskCode
 from ig2mj.tasks.points import Hand, Point
 
@@ -22,6 +23,12 @@ HORIZON = 200
 
 GROUND = ("floors", "carpet", "mat", "rug")
 """Categories that count as the floor: a robot that touches them has not run into anything."""
+
+TABLES = (
+    *("coffee_table", "breakfast_table", "console_table", "desk", "pedestal_table", "gaming_table"),
+    *("countertop", "stand"),
+)
+"""Categories of what activities on a table may be done at, the most like their own first."""
 
 Vector3 = tuple[float, float, float]
 
@@ -116,6 +123,36 @@ class Near:
 
 
 @dataclasses.dataclass(frozen=True)
+class Fit:
+    """What an activity needs of a home that is not its own (`ig2mj.tasks.relocation`).
+
+    Attributes:
+      surface: what its objects lie on in its own home. surfaces: categories of what they may lie on, the best first.
+      anchor: furniture at which it is done, "" for none. anchors: categories of that. link: of the anchor, must be in
+        reach; None: its middle.
+      target: m ahead and to the left of the robot where that is at home.
+      of_home: loose objects of the own home, which are added to others.
+      heights: m, least and most of the surface. on_floor: objects lie on the floor or a carpet.
+      reach: m from the shoulder to the anchor. within: m from it to what lies on the surface. gap: m from the robot to
+        the surface. aside: m, most by which the anchor is to the side.
+    """
+
+    surface: str
+    surfaces: tuple[str, ...]
+    anchor: str = ""
+    anchors: tuple[str, ...] = ()
+    link: LinkKind | None = None
+    target: tuple[float, float] | None = None
+    of_home: tuple[str, ...] = ()
+    heights: tuple[float, float] = (0.3, 1.0)
+    on_floor: bool = False
+    reach: float = 1.0
+    within: float = 0.9
+    gap: float = 0.45
+    aside: float = 0.75
+
+
+@dataclasses.dataclass(frozen=True)
 class Physical:
     """What is different in an activity where nothing holds but friction: objects that fit between two fingers.
 
@@ -149,6 +186,9 @@ class Task:
       physical: what is different with "physical" grasping; None: nothing.
       whole_actions: an action has every number of the robot's controller unless something else is asked for.
       code: what the task says in functions of its author's; None: nothing.
+      fit: what it needs of other homes; None: it is bound to furniture at the places of its own. turned: degrees, a
+        multiple of 90, by which everything is turned against the own home. roles: names of objects of the own home, and
+        of those that have their parts here.
       expert: from a `tasks.experts.sight.ExpertView` to a list of one `tasks.experts.motion.HandMotion` for each acting
         hand: what it should do now. Pure and batched. None: the task has no scripted expert.
     """
@@ -173,6 +213,9 @@ class Task:
     expert: Callable[..., Any] | None = dataclasses.field(default=None, repr=False)
     whole_actions: bool = dataclasses.field(default=False, repr=False)
     code: TaskCode | None = dataclasses.field(default=None, repr=False)
+    fit: Fit | None = dataclasses.field(default=None, repr=False)
+    turned: int = dataclasses.field(default=0, repr=False)
+    roles: Mapping[str, str] = dataclasses.field(default_factory=dict, repr=False)
     depth_range: ClassVar[float] = 3.0
     """m from the camera within which everything lies that matters: an arm's reach and the furniture around it."""
 

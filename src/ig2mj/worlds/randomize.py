@@ -202,7 +202,7 @@ class Randomize:
     def __post_init__(self) -> None:
         """Raises EngineError, UnknownNameError: an axis is neither True nor settings of it."""
         for name in AXES:
-            self.settings(name)
+            object.__setattr__(self, name, self.settings(name))
 
     @classmethod
     def of(cls, given: Any) -> Randomize | None:

@@ -17,7 +17,7 @@ from ig2mj.tasks.experts.motion import HandMotion, hand_motion, over, where
 from ig2mj.tasks.experts.reaching import take_at
 from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import At, Hand
-from ig2mj.tasks.task import BIMANUAL_WEIGHTS, BOTH, Acts, Near, Task
+from ig2mj.tasks.task import BIMANUAL_WEIGHTS, BOTH, Acts, Fit, Near, Task
 
 POT, TABLE = "cauldron_0", "coffee_table_0"
 
@@ -69,4 +69,7 @@ BIMANUAL_PICK_AND_PLACE = Task(
     ),
     robots={"humanoid": Acts((1.85, 0.0, 0.55), hands=BOTH, weights=BIMANUAL_WEIGHTS)},
     expert=plan,
+    fit=Fit(
+        surface="carpet_0", surfaces=("carpet",), anchor=TABLE, anchors=("coffee_table",), on_floor=True, within=1.05
+    ),
 )

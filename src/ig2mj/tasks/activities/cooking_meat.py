@@ -7,12 +7,13 @@ counter onto the stove.
 
 from __future__ import annotations
 
+from ig2mj.scene.tables import LinkKind
 from ig2mj.tasks.experts.motion import HandMotion, hand_motion, over, where
 from ig2mj.tasks.experts.pushing import draw
 from ig2mj.tasks.experts.reaching import take
 from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import At, Hand, Heat
-from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Task
+from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Fit, Near, Task
 
 MEAT, STOVE = "steak_0", "stove_0"
 
@@ -48,4 +49,13 @@ COOKING_MEAT = Task(
         "fetch": Acts((-2.2, -1.65, 0.0), yaw=90.0),
     },
     expert=plan,
+    fit=Fit(
+        surface="bottom_cabinet_1",
+        surfaces=("bottom_cabinet", "countertop", "dishwasher", "console_table", "sink"),
+        anchor="stove_0",
+        anchors=("stove",),
+        link=LinkKind.HEAT_SOURCE,
+        target=(0.67, -0.5),
+        heights=(0.7, 1.1),
+    ),
 )

@@ -13,7 +13,7 @@ from ig2mj.tasks.experts.pushing import draw
 from ig2mj.tasks.experts.reaching import take
 from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import At, Hand
-from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Task
+from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, TABLES, Acts, Fit, Near, Task
 
 TABLE = "coffee_table_0"
 
@@ -60,4 +60,5 @@ GRASPING_BOOK = Task(
         "fetch": Acts((2.3, 0.0, 0.015)),
     },
     expert=plan,
+    fit=Fit(surface=TABLE, surfaces=TABLES, of_home=("notebook_0",)),
 )

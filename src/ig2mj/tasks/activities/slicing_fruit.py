@@ -21,7 +21,7 @@ from ig2mj.tasks.experts.motion import HandMotion, hand_motion, horizontal, over
 from ig2mj.tasks.experts.reaching import far_out, take_thin
 from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import At, Hand
-from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Physical, Task
+from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, TABLES, Acts, Fit, Near, Physical, Task
 
 KNIFE, FRUIT = "carving_knife_0", "apple_0"
 
@@ -135,4 +135,5 @@ SLICING_FRUIT = Task(
         near=ON_NEAR_SIDE,
     ),
     expert=plan,
+    fit=Fit(surface="coffee_table_0", surfaces=TABLES),
 )

@@ -17,12 +17,13 @@ from jaxtyping import Float
 
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length
+from ig2mj.scene.tables import LinkKind
 from ig2mj.tasks.experts.gripping import grip_standing
 from ig2mj.tasks.experts.motion import RISE, HandMotion, around, hand_motion, levelled, outward, where
 from ig2mj.tasks.experts.reaching import take, take_at
 from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import WATER_BELOW, At, Hand, Water
-from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Physical, Task
+from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Fit, Near, Physical, Task
 
 TOWEL, SINK = "bath_towel_0", "sink_0"
 
@@ -131,4 +132,12 @@ SOAKING_TOWEL = Task(
         robots={"fetch": Acts((2.78, -2.92, 0.0), yaw=-60.0, camera_tilt=0.75, camera_pan=1.25)},
     ),
     expert=plan,
+    fit=Fit(
+        surface="dishwasher_0",
+        surfaces=("dishwasher", "bottom_cabinet", "countertop", "console_table"),
+        anchor=SINK,
+        anchors=("sink",),
+        link=LinkKind.WATER_SOURCE,
+        heights=(0.7, 1.1),
+    ),
 )

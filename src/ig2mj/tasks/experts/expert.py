@@ -21,6 +21,7 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import TURN_SPEED
 from ig2mj.tasks.experts.motion import HandMotion
+from ig2mj.tasks.experts.quarters import quarter_turn, turned_view
 from ig2mj.tasks.experts.sight import Belief, ExpertView
 from ig2mj.tasks.task import Task, role_of
 
@@ -67,6 +68,9 @@ class Expert:
           beliefs: where it takes objects to be, in the frame of the robot's base; None: where they are.
         """
         base = jnp.asarray(view.agent.base_quat)[:, 0]
+        if self.task.turned:  # experts see the world as it is in the task's own home
+            turn = quarter_turn(-self.task.turned)
+            view, base = turned_view(view, turn), quat_multiply(turn, base)
         see = ExpertView(
             view=view,
             states=states,

@@ -1,0 +1,355 @@
+"""Activities in homes that are not their own: which furniture takes part there, and where the robot stands.
+
+    task = relocated(COOKING_MEAT, "willow")
+
+An activity says in `Task.fit` what furniture it needs. In another home every piece of that kind is tried: the robot
+stands on free floor in front of it, facing it as it does at home, and what it needs must be within reach of its hand.
+Of all places that will do, the one that is most like the own home's is taken. Everything follows from the home's
+geometry at its start, so that the same home always gives the same task.
+
+Homes are turned by quarters against each other (`Task.turned`): experts see the world as it is at home.
+
+Axis: N points.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import os
+import pathlib
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ig2mj.errors import EngineError
+from ig2mj.geometry.poses import quat_rotate
+from ig2mj.scene.additions import name_additions
+from ig2mj.scene.library import LibraryName
+from ig2mj.scene.paths import SHIPPED_HOMES, scene_folder
+from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.scene.tables import LinkKind
+from ig2mj.tasks.task import Acts, Fit, Near, Task
+
+BODY = 0.27
+"""m around the middle of a robot that are free of everything between `LOW` and `HIGH` above the floor."""
+
+LOW, HIGH = 0.06, 1.3
+"""m above the floor."""
+
+SHOULDER = (-0.15, -0.15, 0.85)
+"""m ahead, to the left and above the floor of the robot: from where the right hand reaches, as at home."""
+
+STEP = 0.05
+"""m between positions that are tried, and between points of a surface that count."""
+
+AROUND = 1.2
+"""m around the furniture within which the robot may stand."""
+
+MARGIN = 0.06
+"""m from the edge of a surface on which nothing is put."""
+
+AHEAD, ASIDE = (0.28, 0.95), 0.55
+"""m ahead of the robot, least and most, and to either side, where it sees what lies before it."""
+
+ENOUGH = 24
+"""Points of a surface in reach: 0.06 m2. With fewer, hardly any sampled state would count."""
+
+SITS = 0.05
+"""m: fixed things no higher than this, such as carpets, are stood on."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Spot:
+    """Where a task could be done.
+
+    Attributes:
+      surface, anchor: objects of the home; anchor "" where none is needed. x, y: m. quarter: turns by 90 degrees of
+        what the robot faces, from x. height: m of the floor there. likeness: larger is more like the task's own home.
+    """
+
+    surface: str
+    anchor: str
+    x: float
+    y: float
+    quarter: int
+    height: float
+    likeness: float
+
+
+class Household:
+    """Boxes of a home's geometry at its start, world frame, m."""
+
+    def __init__(self, scene: Scene):
+        data, model, tables = scene.start_data(), scene.model, scene.tables
+        turn = data.geom_xmat.reshape(-1, 3, 3)
+        middle = data.geom_xpos + np.einsum("gij,gj->gi", turn, model.geom_aabb[:, :3])
+        half = np.einsum("gij,gj->gi", np.abs(turn), model.geom_aabb[:, 3:])
+        solid = ((model.geom_contype > 0) | (model.geom_conaffinity > 0)) & (
+            model.geom_type != int(mujoco.mjtGeom.mjGEOM_PLANE)
+        )
+        self.scene, self.categories = scene, list(tables.object_categories)
+        self.low, self.high = middle - half, middle + half
+        self.owner = np.where(solid, tables.geom_object, -2)
+        self.fixed, self._data = tables.object_fixed, data
+
+    def of(self, category: str) -> list[str]:
+        """Names of the fixed objects of a category."""
+        names = enumerate(self.scene.object_names)
+        return [name for k, name in names if self.categories[k] == category and self.fixed[k]]
+
+    def box(self, name: str) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """Lowest and highest corner of an object."""
+        own = self.owner == self.scene.object_index(name)
+        return self.low[own].min(0), self.high[own].max(0)
+
+    def link(self, name: str, kind: LinkKind) -> Float[np.ndarray, "3"] | None:
+        """Where an object's first annotated link of a kind is; None: it has none."""
+        tables = self.scene.tables
+        found = np.flatnonzero((tables.link_object == self.scene.object_index(name)) & (tables.link_kind == kind))
+        if not len(found):
+            return None
+        body, own = int(tables.link_body[found[0]]), tables.link_pos[found[0]]
+        turned = np.asarray(quat_rotate(np.array(self._data.xquat[body], np.float32), np.array(own, np.float32)))
+        return self._data.xpos[body] + turned
+
+    def facing(self, name: str) -> int | None:
+        """Quarters by which the front of an object is turned from x; None: it stands askew."""
+        root = int(self.scene.tables.object_root[self.scene.object_index(name)])
+        front = self._data.xmat[root].reshape(3, 3)[:, 0]
+        quarter = round(math.atan2(front[1], front[0]) / (math.pi / 2)) % 4
+        return quarter if front @ axes_of(quarter)[0] > 0.99 else None
+
+    def free(self, points: Float[np.ndarray, "N 2"], floor: float) -> Bool[np.ndarray, "N"]:
+        """Whether a robot has room there."""
+        high, low = self.high[:, 2] - floor, self.low[:, 2] - floor
+        near = (self.owner > -2) & (high > LOW) & (low < HIGH)
+        near &= ((self.high[:, :2] > points.min(0) - BODY) & (self.low[:, :2] < points.max(0) + BODY)).all(1)
+        if not near.any():
+            near[0] = True
+        gap = np.maximum(self.low[near, :2] - points[:, None], points[:, None] - self.high[near, :2])
+        clear = np.linalg.norm(np.maximum(gap, 0.0), axis=-1).min(1) >= BODY
+        rooms = self.scene.rooms
+        return clear if rooms is None else clear & (rooms.index_at(points) >= 0)
+
+    def floor(self, point: Float[np.ndarray, "2"]) -> float:
+        """m above the floor of what is stood on there."""
+        under = (self.owner >= 0) & (self.high[:, 2] < SITS)
+        under &= (self.low[:, :2] <= point).all(1) & (self.high[:, :2] >= point).all(1)
+        return float(max(0.0, *self.high[under, 2], 0.0))
+
+
+def axes_of(quarter: int) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Directions ahead and to the left of a robot that is turned by so many quarters."""
+    x, y = ((1, 0), (0, 1), (-1, 0), (0, -1))[quarter % 4]
+    return np.array([x, y, 0.0]), np.array([-y, x, 0.0])
+
+
+def relocated(task: Task, home: str | os.PathLike) -> Task:
+    """The task in another home. Raises EngineError: it does not fit; says why. InputError: there is no such home."""
+    folder = scene_folder(home)
+    if task.fit is None:
+        raise EngineError(f"{task.name} cannot be done in '{folder.name}': only in homes with the furniture of its own")
+    return _moved(task, _name_of(home, folder), _spot(task.name, task.fit, _own(task), str(folder)))
+
+
+def reason_against(task: Task, home: str | os.PathLike) -> str:
+    """Why a task cannot be done in a home; "" if it can."""
+    try:
+        if scene_folder(task.home) != scene_folder(home):
+            relocated(task, home)
+    except EngineError as e:
+        return str(e)
+    return ""
+
+
+def _name_of(home: str | os.PathLike, folder: pathlib.Path) -> str:
+    return os.fspath(home) if folder.parent == SHIPPED_HOMES else str(folder.resolve())
+
+
+def _own(task: Task) -> tuple[float, float, float]:
+    """x, y (m) and yaw (degrees) of the robot at home."""
+    acts = next(iter(task.robots.values()))
+    assert acts.pos is not None and task.fit is not None
+    return acts.pos[0], acts.pos[1], acts.yaw
+
+
+@functools.lru_cache(maxsize=256)
+def _spot(name: str, fit: Fit, own: tuple[float, float, float], folder: str) -> Spot:
+    """The best spot in a home. Raises EngineError: there is none."""
+    home = Household(load_scene(folder))
+    label = home.scene.name
+    anchors = [a for kind in fit.anchors for a in home.of(kind)] if fit.anchors else [""]
+    surfaces = [(s, rank) for rank, kind in enumerate(fit.surfaces) for s in home.of(kind)]
+    if not anchors:
+        raise EngineError(f"{name} cannot be done in '{label}': it has no {' and no '.join(fit.anchors)}")
+    if not surfaces:
+        raise EngineError(f"{name} cannot be done in '{label}': it has no {', '.join(fit.surfaces)}")
+    found: list[Spot] = []
+    for rank in range(len(fit.surfaces)):  # the next kind only where there is nothing of the one before
+        pairs = [(a, s) for a in anchors for s, of in surfaces if of == rank]
+        found += [spot for a, s in pairs for spot in _spots(home, fit, a, s, rank)]
+        if found and not anchors[0]:
+            break
+    if not found:
+        words = f"with {' or '.join(fit.anchors)} " if fit.anchors else ""
+        raise EngineError(
+            f"{name} cannot be done in '{label}': nowhere on its free floor is a {' or '.join(fit.surfaces)} {words}"
+            "within a robot's reach"
+        )
+    return max(found, key=lambda spot: spot.likeness)
+
+
+def _spots(home: Household, fit: Fit, anchor: str, surface: str, rank: int) -> Iterator[Spot]:
+    """Positions from which a surface and an anchor are in reach."""
+    if anchor == surface:
+        return
+    low, high = home.box(surface)
+    if fit.on_floor:
+        high = high.copy()
+        if high[2] > SITS:
+            return
+    elif not fit.heights[0] <= high[2] <= fit.heights[1]:
+        return
+    target, quarters = None, range(4)
+    if anchor and fit.link is not None:
+        target, facing = home.link(anchor, fit.link), home.facing(anchor)
+        if target is None or facing is None:
+            return
+        quarters = [(facing + 2) % 4]
+    elif anchor:
+        box = home.box(anchor)
+        target = np.array([*(0.5 * (box[0] + box[1]))[:2], box[1][2]])
+    spread = np.array([*np.meshgrid(*(np.arange(low[k] + MARGIN, high[k] - MARGIN, STEP) for k in (0, 1)))])
+    if not spread.size:
+        return
+    points = np.column_stack([spread.reshape(2, -1).T, np.full(spread[0].size, high[2])])
+    middle = np.array([*(0.5 * (low + high))[:2]]) if target is None else target[:2]
+    reach = AROUND + (0.5 * (high - low)[:2].max() if target is None else 0.0)
+    for quarter in quarters:
+        ahead, left = axes_of(quarter)
+        step = STEP if anchor else 2 * STEP
+        ticks = np.arange(-reach, reach + step, step)
+        at = np.round((middle + np.array(np.meshgrid(ticks, ticks)).reshape(2, -1).T) / STEP) * STEP
+        if target is None:  # in front of the surface
+            beside = np.maximum(low[:2] - at, at - high[:2])
+            at = at[np.linalg.norm(np.maximum(beside, 0.0), axis=1) < fit.gap + 0.1]
+        if not len(at):
+            continue
+        at = at[home.free(at, 0.0)]
+        if target is not None:
+            off = target[:2] - at
+            seen = (off @ ahead[:2] > 0.2) & (np.abs(off @ left[:2]) < fit.aside)
+            at = at[seen]
+        for x, y in at:
+            spot = _judged(home, fit, anchor, surface, rank, (float(x), float(y), quarter), points, target)
+            if spot is not None:
+                yield spot
+
+
+def _judged(
+    home: Household,
+    fit: Fit,
+    anchor: str,
+    surface: str,
+    rank: int,
+    pose: tuple[float, float, int],
+    points: Float[np.ndarray, "N 3"],
+    target: Float[np.ndarray, "3"] | None,
+) -> Spot | None:
+    """A position, if it will do. `points`: of the surface. `target`: what of the anchor must be in reach."""
+    x, y, quarter = pose
+    ahead, left = axes_of(quarter)
+    here = np.array([x, y, 0.0])
+    shoulder = here + SHOULDER[0] * ahead + SHOULDER[1] * left + np.array([0, 0, SHOULDER[2]])
+    if target is not None and np.linalg.norm(target - shoulder) > fit.reach:
+        return None
+    off = points - here
+    least, most = AHEAD
+    seen = (off @ ahead > least) & (off @ ahead < most) & (np.abs(off @ left) < ASIDE)
+    near = seen & (np.linalg.norm(points - shoulder, axis=1) < fit.within)
+    if near.sum() < ENOUGH:
+        return None
+    height = home.floor(here[:2])
+    likeness = min(float(near.sum()), 120.0) / 120.0 - 0.3 * rank
+    if fit.target is not None and target is not None:
+        offset = target - here
+        likeness -= 2.0 * float(np.hypot(offset @ ahead - fit.target[0], offset @ left - fit.target[1]))
+    gap = float((off[near] @ ahead).min())
+    likeness -= 2.0 * max(0.0, gap - fit.gap)
+    return Spot(surface, anchor, round(x, 3), round(y, 3), quarter, round(height, 3), likeness)
+
+
+def _moved(task: Task, home: str, spot: Spot) -> Task:
+    """The task at a spot of another home."""
+    fit = task.fit
+    assert fit is not None
+    own = _own(task)
+    names = {fit.surface: spot.surface} | ({fit.anchor: spot.anchor} if fit.anchor else {})
+    objects = task.objects
+    if fit.of_home:
+        taken = load_scene(scene_folder(home)).object_names
+        added = tuple(LibraryName(name.rsplit("_", 1)[0]) for name in fit.of_home)
+        names |= dict(zip(fit.of_home, (n for n, _ in name_additions(list(taken), added)), strict=True))
+        objects = (*objects, *added)
+    ahead, left = axes_of(spot.quarter)
+    home_ahead, home_left = axes_of(round(own[2] / 90.0))
+    turned = 90 * ((spot.quarter - round(own[2] / 90.0)) % 4)
+    here, there = np.array([spot.x, spot.y, 0.0]), np.array([own[0], own[1], 0.0])
+
+    def place(pos: Any) -> tuple[float, ...]:
+        offset = np.array([pos[0], pos[1], 0.0]) - there
+        x, y, _ = here + (offset @ home_ahead) * ahead + (offset @ home_left) * left
+        return (round(float(x), 3), round(float(y), 3), *pos[2:])
+
+    def acts(name: str, one: Acts) -> Acts:
+        assert one.pos is not None
+        height = one.pos[2] if name == "humanoid" and len(one.pos) == 3 else spot.height
+        return dataclasses.replace(one, pos=(*place(one.pos)[:2], height), yaw=(one.yaw + turned) % 360)
+
+    def near(one: Near) -> Near:
+        x, y, z = place(one.pos)
+        return dataclasses.replace(one, pos=(x, y, z))
+
+    physical = task.physical
+    if physical is not None:
+        robots = {name: acts(name, one) for name, one in physical.robots.items()}
+        physical = dataclasses.replace(physical, near=tuple(map(near, physical.near)), robots=robots)
+    moved = dataclasses.replace(
+        task,
+        home=home,
+        objects=objects,
+        near=tuple(map(near, task.near)),
+        robots={name: acts(name, one) for name, one in task.robots.items()},
+        physical=physical,
+        turned=turned,
+        roles=names,
+    )
+    return with_names(moved, names)
+
+
+_TEXTS = ("start", "near", "flat", "upright", "goal", "objects_of_interest", "distances", "stains_of", "physical")
+
+
+def with_names(task: Task, names: Mapping[str, str]) -> Task:
+    """The task in which objects have other names."""
+    return dataclasses.replace(task, **{field: renamed(getattr(task, field), names) for field in _TEXTS})
+
+
+def renamed(value: Any, names: Mapping[str, str]) -> Any:
+    """A part of a task in which objects have other names."""
+    if isinstance(value, str):
+        found = re.compile(r"(?<![\w.])(" + "|".join(map(re.escape, names)) + r")(?![\w.])")
+        return found.sub(lambda m: names[m.group(1)], value)
+    if isinstance(value, tuple):
+        return tuple(renamed(part, names) for part in value)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+        own = {name: renamed(part, names) for name, part in fields.items() if not isinstance(part, Mapping)}
+        return dataclasses.replace(value, **own)
+    return value
