@@ -74,3 +74,21 @@ def arrivals(home: str, pairs: int) -> list[bool]:
 def test_the_humanoid_arrives_in_95_of_100_drives(home):
     found = arrivals(home, 10)
     assert len(found) >= 15 and np.mean(found) >= 0.95
+
+
+@pytest.mark.slow
+def test_the_humanoid_arrives_in_a_small_home():
+    assert all(arrivals("small_home", 2))
+
+
+def test_ways_lead_between_all_free_places_of_a_small_home():
+    scene = ig2mj.load_scene("small_home", agents=[Humanoid().at(-1.0, 0.0, 0.0)])
+    planner, view = MotionPlanner(scene), SceneQuery(scene).view
+    floor = planner.floor(view)
+    cells = np.argwhere(np.isfinite(floor.distances((-1.0, 0.0), NEAR_START)))
+    assert len(cells) > 0.9 * floor.free.sum()
+    for goal in floor.occupancy.middles(np.random.default_rng(0).permutation(cells)[:10]):
+        plan = planner.plan_base(view, goal)
+        assert plan.reason == "" and plan.length >= np.linalg.norm(goal - plan.points[0]) - 0.15
+        spare = [floor.nearest(point, 0.06) is not None for point in plan.points[1:]]
+        assert all(spare)
