@@ -15,13 +15,13 @@ from ig2mj.planning.moves import (
     UP,
     Primitive,
     Program,
-    ahead,
     carry,
     first_way,
     free_hand,
     hand_path,
     hand_with,
     rest,
+    towards,
     travel,
     vector3,
 )
@@ -85,10 +85,10 @@ def is_graspable(world: PlannedWorld, name: str) -> bool:
 def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generator[Program, str, tuple[str, str]]:
     """Takes an object from where the robot stands; returns why it did not, as a reason and in words."""
     index = world.index(name)
-    _, yaw = world.base
+    here, _ = world.base
     start = pose.at(pose.before)
     spheres = world.spheres(pose.fingers, pose.palm)
-    way = hand_path(world.obstacles([name]), spheres, world.grip(hand), start, entries(pose, yaw), search=True)
+    way = hand_path(world.obstacles([name]), spheres, world.grip(hand), start, entries(pose, here), search=True)
     if way is None:
         return "no_path", f"the hand has no way to {name}"
     quat = world.body.turned(hand, pose.fingers, pose.palm)
@@ -115,10 +115,10 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     return reason or "slipped", detail
 
 
-def entries(pose: GraspPose, yaw: float) -> list[Vector]:
-    """Directions from which a hand of a robot that looks along `yaw` may come to a grasp: back to the robot, off the
+def entries(pose: GraspPose, xy: Sequence[float] | np.ndarray) -> list[Vector]:
+    """Directions from which a hand of a robot that stands at `xy` may come to a grasp: back to the robot, off the
     object's side, up."""
-    return [-ahead(yaw), -pose.palm, UP]
+    return [-towards(xy, pose.point), -pose.palm, UP]
 
 
 def _plan(
@@ -141,7 +141,7 @@ def _plan(
 
     def has_way(candidate: tuple[Stance, GraspPose], search: bool) -> bool:
         stance, pose = candidate
-        spheres, goal, back = world.spheres(pose.fingers, pose.palm), pose.at(pose.before), entries(pose, stance.yaw)
+        spheres, goal, back = world.spheres(pose.fingers, pose.palm), pose.at(pose.before), entries(pose, stance.xy)
         return hand_path(obstacles, spheres, world.resting(hand, stance), goal, back, search=search) is not None
 
     return first_way(candidates(), has_way, WAYS)

@@ -99,6 +99,12 @@ def ahead(yaw: float) -> Vector:
     return np.array([np.cos(yaw), np.sin(yaw), 0.0])
 
 
+def towards(xy: Sequence[float] | np.ndarray, point: Vector) -> Vector:
+    """The horizontal direction from a place on the floor to a point."""
+    offset = np.array([*(point[:2] - np.asarray(xy, float)), 0.0])
+    return offset / max(float(np.linalg.norm(offset)), 1e-9)
+
+
 def travel(hand: int, points: Sequence[Vector], quat, keeps: int = -1) -> Program:
     """Phases of a hand along points of a way."""
     last = len(points) - 1

@@ -12,11 +12,11 @@ from ig2mj.planning.moves import (
     DOWN,
     UP,
     Primitive,
-    ahead,
     first_way,
     free_hand,
     hand_path,
     rest,
+    towards,
     travel,
     vector3,
 )
@@ -27,6 +27,9 @@ from ig2mj.scene.tables import LinkKind
 
 FINGER, NEAR_BUTTON = 0.06, 0.13
 """m from a grasp point to the fingers' frames, and before a button at which a hand comes to it."""
+
+LOWER = 0.035
+"""m below a button that a hand stays which comes to it under what stands out above it, such as a lamp's shade."""
 
 STANCES = 12
 """That are tried."""
@@ -50,11 +53,10 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             if found is None:
                 reason, detail = "no_base", f"no free floor from which a hand reaches the button of {name}"
                 continue
-            stance, aim = found
+            stance, aim, lower = found
             if reason := (yield from go(world, stance)):
                 continue
-            _, yaw = world.base
-            fingers = ahead(yaw)
+            fingers = towards(world.base[0], button)
             quat = world.body.turned(hand, fingers, DOWN)
             way = hand_path(
                 world.obstacles(), world.spheres(fingers), world.grip(hand), aim, [UP, -fingers], search=True
@@ -62,7 +64,7 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             if way is None:
                 reason, detail = "no_path", f"the hand has no way to the button of {name}"
                 continue
-            at = vector3(button - fingers * FINGER)
+            at = vector3(button - fingers * FINGER - lower * UP)
             reason = yield [
                 *travel(hand, way, quat),
                 Phase(hand=hand, pos=at, quat=quat, until=Until.WAITED, limit=5, speed=0.03),
@@ -79,8 +81,9 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
 
 def _plan(
     world: PlannedWorld, point: Vector, hand: int, attempt: int, at: Stance | None
-) -> tuple[Stance, Vector] | None:
-    """A stance, and a point near a button that a hand has a way to; from there the fingers go to the button.
+) -> tuple[Stance, Vector, float] | None:
+    """A stance, and a point near a button that a hand has a way to; from there the fingers go to so many m below the
+    button.
 
     Args:
       at: where the robot stays, since a hand holds what is switched; None: it may go anywhere.
@@ -88,18 +91,19 @@ def _plan(
     obstacles, floor = world.obstacles(), world.floor()
     passed = 0
 
-    def candidates() -> Iterator[tuple[Stance, Vector]]:
+    def candidates() -> Iterator[tuple[Stance, Vector, float]]:
         for stance in world.stances(hand, point, floor, AWAY, most=STANCES) if at is None else [at]:
-            fingers = ahead(stance.yaw)
-            yield stance, point - fingers * (NEAR_BUTTON + FINGER)
-            yield stance, point + NEAR_BUTTON * UP - fingers * FINGER
+            fingers = towards(stance.xy, point)
+            yield stance, point - fingers * (NEAR_BUTTON + FINGER), 0.0
+            yield stance, point + NEAR_BUTTON * UP - fingers * FINGER, 0.0
+            yield stance, point - fingers * (NEAR_BUTTON + FINGER) - LOWER * UP, LOWER
 
-    def has_way(candidate: tuple[Stance, Vector], search: bool) -> bool:
+    def has_way(candidate: tuple[Stance, Vector, float], search: bool) -> bool:
         nonlocal passed
-        stance, aim = candidate
-        fingers, rests = ahead(stance.yaw), world.resting(hand, stance)
+        stance, aim, _ = candidate
+        fingers, rests = towards(stance.xy, point), world.resting(hand, stance)
         found = hand_path(obstacles, world.spheres(fingers), rests, aim, [UP, -fingers], search=search) is not None
         passed += found
         return found and passed > attempt
 
-    return first_way(candidates(), has_way, 2 * STANCES)
+    return first_way(candidates(), has_way, 3 * STANCES)
