@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+import sys
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -130,6 +131,9 @@ def coverage(
     results: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None,
     sample: Flag = False,
     seconds: float = 60.0,
+    seeds: int = 10,
+    minutes: float = float("inf"),
+    jobs: int = 1,
     page: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.md")] = None,
     json: Flag = False,
 ) -> None:
@@ -139,10 +143,12 @@ def coverage(
 
     Args:
       names: only these definitions; default: all.
-      results: folder of what was sampled, one file for each definition; those that are there are not sampled again.
-      sample: sample start states of definitions that fit, 10 seeds each, into --results. All of them take days of
-        processor time: give names to share the work.
+      results: folder of what was sampled, one file for each definition; a definition goes on where it was.
+      sample: sample start states of definitions that fit into --results. All of them take hours of processor time.
       seconds: wall time for each seed.
+      seeds: with how many of the 10 seeds; a first run with 1 shows what fails.
+      minutes: after which no further definition is begun.
+      jobs: number of processes; 0: one per processor.
       page: write a page of documentation with every definition.
       json: print JSON instead of a table.
     """
@@ -154,6 +160,8 @@ def coverage(
 
     if sample and results is None:
         raise Ig2mjError("--sample needs --results DIR, where results are kept")
+    if not 1 <= seeds <= all_of_it.SEEDS:
+        raise Ig2mjError(f"--seeds {seeds}: from 1 to {all_of_it.SEEDS}")
     if page is not None:
         check_output(page)
     known = activity_names(True)
@@ -163,11 +171,13 @@ def coverage(
     with progress_bar() as bar:
         rows = all_of_it.cover(homes, results, names or None, add_bar(bar, "binding definitions"))
         if sample and results is not None:
-            report = add_bar(bar, "sampling start states")
             unsampled = [row.name for row in rows if row.homes and row.sampled is None]
-            for done, name in enumerate(unsampled):
-                report(done, len(unsampled), name)
-                all_of_it.sample_definition(name, homes, results, seconds)
+            report = add_bar(bar, "sampling start states")
+            failed = all_of_it.sample_definitions(
+                unsampled, [home.name for home in homes], results, seconds, seeds, minutes, jobs, report
+            )
+            for name, why in failed.items():
+                print(f"{name}: {why}", file=sys.stderr)
             rows = all_of_it.cover(homes, results, names or None)
     if page is not None:
         page.write_text(all_of_it.page(rows), encoding="utf-8")

@@ -2,8 +2,8 @@
 
 - *Expressible*: every predicate, substance and transition rule that it needs is here.
 - *Fits*: a home, with what the object library adds to it, has every object that it names.
-- *Sampled*: a start state was found with at least `ENOUGH` of `SEEDS` seeds in such a home. Results of sampling are
-  kept in a folder, one file for each definition.
+- *Sampled*: a start state was found with at least `ENOUGH` of `SEEDS` seeds in such a home: rows of a pool, each with
+  its own generator. Results of sampling are kept in a folder, one file for each definition.
 """
 
 from __future__ import annotations
@@ -11,15 +11,21 @@ from __future__ import annotations
 import collections
 import dataclasses
 import json
+import math
+import os
 import pathlib
+import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ig2mj.callbacks import ProgressCallback, no_progress
+from ig2mj.cluster.job_runner import Where, map_jobs
+from ig2mj.cluster.jobs import Job, JobSet
 from ig2mj.errors import EngineError, Ig2mjError
-from ig2mj.scene.manifest import Manifest
+from ig2mj.scene.manifest import Manifest, load_manifest
+from ig2mj.scene.paths import scene_folder
 from ig2mj.tasks.bddl.definitions import activity_names, load_activity
-from ig2mj.tasks.bddl.start import first_that_works, fitting, sample_start
+from ig2mj.tasks.bddl.start import HOMES, fitting, load_bound, sample_start
 from ig2mj.tasks.bddl.vocabulary import VocabularyError
 
 SEEDS, ENOUGH = 10, 8
@@ -34,7 +40,8 @@ class Coverage:
 
     Attributes:
       lacks: what it needs that is not here; empty: it is expressible. homes: that fit, the best first.
-      missing: why no home fits, of the home that lacks least. sampled: seeds with a start state; None: not tried.
+      missing: why no home fits, of the home that lacks least. sampled: seeds with a start state; None: not all were
+        tried. first: some seed had one.
     """
 
     name: str
@@ -42,6 +49,7 @@ class Coverage:
     homes: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     sampled: int | None = None
+    first: bool = False
 
     @property
     def why_not(self) -> str:
@@ -87,32 +95,79 @@ def _one(name: str, homes: Sequence[Manifest], results: pathlib.Path | None) -> 
     if not bound:
         return Coverage(name, missing=tuple(min(errors.values(), key=len)) if errors else ("no homes",))
     file = None if results is None else results / f"{name}.json"
-    sampled = json.loads(file.read_text(encoding="utf-8"))["sampled"] if file is not None and file.is_file() else None
-    return Coverage(name, homes=tuple(b.home for b in bound), sampled=sampled)
+    said = json.loads(file.read_text(encoding="utf-8")) if file is not None and file.is_file() else {}
+    sampled = said["sampled"] if said.get("tried", 0) >= SEEDS else None
+    return Coverage(name, homes=tuple(b.home for b in bound), sampled=sampled, first=said.get("sampled", 0) > 0)
 
 
-def sample_definition(name: str, homes: Sequence[Manifest], results: pathlib.Path, seconds: float) -> int:
-    """Samples start states of a definition with `SEEDS` seeds, and writes down how many were found.
+def sample_definitions(
+    names: Sequence[str],
+    homes: Sequence[str],
+    results: pathlib.Path,
+    seconds: float,
+    seeds: int = SEEDS,
+    minutes: float = math.inf,
+    jobs: int = 1,
+    progress: ProgressCallback = no_progress,
+) -> dict[str, str]:
+    """Samples start states of definitions, and writes down how many were found: `<name>.json` for each.
+
+    What is there already goes on: so many seeds more as are missing.
 
     Args:
-      seconds: wall time for each seed.
+      homes: names of shipped homes. seconds: wall time for each seed. seeds: with how many of `SEEDS` seeds.
+      minutes: after which no definition is begun. jobs: processes; 0: one per processor.
+
+    Returns:
+      Why definitions failed with an error, by name.
     """
-    bound, _ = fitting(load_activity(name, True), homes)
-    said: dict[str, Any] = {"activity": name, "sampled": 0, "seeds": SEEDS, "seconds": seconds}
-    try:
-        binding, scene = first_that_works(bound, seconds=seconds)
-        said["home"] = binding.home
-        done = [sample_start(binding, scene, 1, seed, seconds_per_row=seconds) for seed in range(SEEDS)]
-        said["sampled"] = sum(d.sampled.complete for d in done)
-        reasons = collections.Counter[str]()
-        for d in done:
-            reasons += collections.Counter(d.sampled.rejected)
-        said["rejected"] = dict(reasons.most_common(5))
-    except (EngineError, Ig2mjError) as e:
-        said["failed"] = str(e)
     results.mkdir(parents=True, exist_ok=True)
-    (results / f"{name}.json").write_text(json.dumps(said) + "\n", encoding="utf-8")
-    return int(said["sampled"])
+    common = {"homes": list(homes), "results": str(results), "seconds": seconds, "seeds": seeds}
+    end = time.time() + 60 * minutes
+    work = [Job(name, {**common, "name": name, "end": None if math.isinf(end) else end}) for name in names]
+    title = "sampling start states"
+    return map_jobs(JobSet("ig2mj.tasks.bddl.coverage:sample_job", title, work), Where(jobs), progress=progress)[1]
+
+
+def sample_job(
+    name: str, homes: Sequence[str], results: str, seconds: float, seeds: int, end: float | None = None
+) -> bytes:
+    """One definition; arguments as of `sample_definitions`. `end`: seconds since the epoch; nothing is begun later."""
+    if end is not None and time.time() > end:
+        return b""
+    file = pathlib.Path(results) / f"{name}.json"
+    said: dict[str, Any] = {"activity": name, "tried": 0, "sampled": 0, "seconds": seconds, "rejected": {}}
+    if file.is_file():
+        said |= json.loads(file.read_text(encoding="utf-8"))
+    if said["tried"] >= seeds:
+        return b""
+    try:
+        _sample_more(said, name, homes, seconds, seeds)
+    except (EngineError, Ig2mjError) as e:
+        said |= {"failed": str(e), "tried": seeds}
+    written = file.with_suffix(f".{os.getpid()}")
+    written.write_text(json.dumps(said) + "\n", encoding="utf-8")
+    written.replace(file)
+    return b""
+
+
+def _sample_more(said: dict[str, Any], name: str, homes: Sequence[str], seconds: float, seeds: int) -> None:
+    """Tries the seeds that are missing. Of the first `HOMES` homes that fit the first in which the first seed works."""
+    manifests = [load_manifest(scene_folder(home)) for home in homes]
+    bound, _ = fitting(load_activity(name, True), manifests)
+    chosen = [b for b in bound if b.home == said.get("home")] or bound[:HOMES]
+    for binding in chosen:
+        scene, first = load_bound(binding), int(said["tried"])
+        done = sample_start(binding, scene, seeds - first if first else 1, first=first, seconds_per_row=seconds)
+        reasons = collections.Counter(said["rejected"]) + collections.Counter(dict(done.sampled.rejected))
+        said["rejected"] = dict(reasons.most_common(8))
+        found = len(done.sampled.rows)
+        if found or binding is chosen[-1]:
+            home = binding if found else chosen[0]
+            said |= {"home": home.home, "tried": done.sampled.requested + first, "sampled": said["sampled"] + found}
+            break
+    if said["tried"] < seeds:
+        _sample_more(said, name, homes, seconds, seeds)
 
 
 def counts(rows: Iterable[Coverage]) -> dict[str, int]:
