@@ -12,6 +12,7 @@ from hand_world import HandWorld, Item, step
 from substance_world import FLOOR, container
 
 from ig2mj.states import initial_states
+from ig2mj.states.added_checks import AddedUpdates
 from ig2mj.states.substances import things, volume
 
 SMALL = (((0, 0, 0), (0.03, 0.03, 0.03)),)
@@ -150,3 +151,19 @@ def test_many_worlds_do_what_one_does():
         one, other = (step(MODEL, s, KITCHEN.view(touching=[("spoon", "pot")])) for s in (one, other))
     np.testing.assert_allclose(both.volume, jnp.concatenate([one.volume, other.volume]), atol=1e-6)
     np.testing.assert_array_equal(both.absent, jnp.concatenate([one.absent, other.absent]))
+
+
+@pytest.mark.slow
+def test_what_is_baked_is_as_warm_as_its_container_and_cooked():
+    model = dataclasses.replace(
+        MODEL, parameters=dataclasses.replace(MODEL.parameters, cook_temperature=np.full(len(KITCHEN.things), 70.0))
+    )
+    states = _at(_states(absent=["ice_0"], blender_water=0.5), "blender", -10.0)
+    states = step(model, step(model, states, VIEW), VIEW)
+    warmth = float(states.temperature[0, KITCHEN.index["ice_0"]])
+    assert -10 <= warmth < -9 and not states.hatched.any()
+
+
+def test_incremental_steps_are_not_whole_ones_because_of_rules():
+    added = AddedUpdates.of(MODEL)
+    assert not added.whole

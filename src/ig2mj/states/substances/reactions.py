@@ -194,12 +194,10 @@ def _objects_changed(step: EventStep, now: _Now) -> EventStep:
     comes, goes = jnp.any(placed, axis=1), jnp.any(now.taken, axis=1) | now.turned
     kept = {name: jnp.asarray(getattr(states, name)) for name in ("volume", "coat", "drawn", "lost")}
     fields = jax.lax.cond(jnp.any(now.turned), lambda: _spread(step, now), lambda: kept)
-    temperature, hottest = jnp.asarray(states.temperature), jnp.asarray(states.max_temperature)
-    warmth = jnp.sum(jnp.where(placed, temperature[:, found.containers.object, None], 0.0), axis=1)
     heats = np.array([np.isfinite(rule.temperature) for rule in found.rules], bool)
     baked = jnp.any(placed & jnp.any(now.first & heats, axis=-1)[..., None], axis=1)
-    cook = np.where(np.isfinite(model.parameters.cook_temperature), model.parameters.cook_temperature, -np.inf)
-    highest = jnp.where(baked, jnp.maximum(warmth, cook[own.object].astype(np.float32)), warmth)
+    numbers = np.arange(1, placed.shape[1] + 1, dtype=np.int32)[:, None]
+    origin = 2 * jnp.sum(jnp.where(placed, numbers, 0), axis=1) + baked
     centre = found.containers.openings(step.view).centre
     over = jnp.sum(jnp.where(placed[..., None], centre[:, :, None], 0.0), axis=1)
     over = over + jnp.stack([0.0 * number, 0.0 * number, things.DROP + things.APART * number], axis=-1)
@@ -216,8 +214,7 @@ def _objects_changed(step: EventStep, now: _Now) -> EventStep:
     return step.having(
         **fields,
         absent=(gone & ~comes) | goes,
-        temperature=temperature.at[:, own.object].set(jnp.where(comes, warmth, temperature[:, own.object])),
-        max_temperature=hottest.at[:, own.object].set(jnp.where(comes, highest, hottest[:, own.object])),
+        hatched=jnp.where(comes, origin, jnp.asarray(states.hatched)).astype(jnp.int32),
     )
 
 
