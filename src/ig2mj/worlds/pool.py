@@ -75,7 +75,7 @@ def stack(pools: list[Pool]) -> Pool:
 
 def states_like(scene: Scene) -> ExtendedStates | None:
     """States of one world of a scene, of the kind that its rows have; None: those that every scene has."""
-    if not scene.substances:
+    if not scene.substances and not scene.manifest.extras:
         return None
     return initial_states(StateModel.of_manifest(scene.tables, scene.manifest), 1)
 

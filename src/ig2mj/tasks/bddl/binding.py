@@ -129,6 +129,13 @@ class _Binder:
             for a in self.activity.init
             if isinstance(a, logic.Not) and isinstance(a.part, Atom) and a.part.predicate == "real"
         }
+        #: What holds things at the start, and what is held: of BEHAVIOR-1K's, large ones and small ones are taken.
+        pairs = (
+            [a.arguments for a in self.activity.init if isinstance(a, Atom) and a.predicate == "inside"]
+            if activity.behavior_1k
+            else []
+        )
+        self.holders, self.held = {b for _, b in pairs}, {a for a, _ in pairs}
         #: For every object of the activity the objects of the home that may play it, categories that say it best first.
         self.players = {
             name: [o for c in self.kinds[s].categories for o in of_category.get(c, ()) if self.may_play(o, name)]
@@ -136,6 +143,8 @@ class _Binder:
             else []
             for name, s in self.synset.items()
         }
+        for name in self.holders & set(self.players) - set(self.activity.rooms):
+            self.players[name].sort(key=lambda o: -_room(o))
         self.objects: dict[str, str] = {}
         self.rooms: dict[str, str] = {}
         self.added: dict[str, LibraryModel] = {}
@@ -230,7 +239,8 @@ class _Binder:
     def from_library(self, name: str) -> LibraryModel | None:
         """The model to add for an object: categories of its synset in turn, so that three fruits are not all apples."""
         synset_name = self.synset[name]
-        models = _library_models(self.kinds[synset_name], synset_name, lambda entry: self.may_play(entry, name))
+        choose = max if name in self.holders else min if name in self.held else None
+        models = _library_models(self.kinds[synset_name], synset_name, lambda entry: self.may_play(entry, name), choose)
         return models[self.activity.objects[synset_name].index(name) % len(models)] if models else None
 
     def bind_rest(self) -> None:
@@ -304,13 +314,27 @@ def able(o: ObjectEntry, predicates: Iterable[str]) -> bool:
     return True
 
 
-def _library_models(known: Kinds, synset_name: str, fits: Callable[[ObjectEntry], bool]) -> list[LibraryModel]:
+def _room(o: ObjectEntry) -> float:
+    """How much an object holds or takes: litres of its inside, else of its box."""
+    x, y, z = o.bounding_box
+    return 1000 * x * y * z if o.inside is None else o.inside.litres
+
+
+def _library_models(
+    known: Kinds, synset_name: str, fits: Callable[[ObjectEntry], bool], choose: Callable[..., LibraryModel] | None
+) -> list[LibraryModel]:
     """Models of the library for a synset, one of each category: of its own, else of all below it; halves last.
 
     What is fixed furniture a home has or has not.
+
+    Args:
+      choose: `max` takes the largest model of each category, `min` the smallest; None: the first.
     """
-    first = [next(iter(models.values())) for c in known.categories if (models := library().get(c))]
+    found = [list(models.values()) for c in known.categories if (models := library().get(c))]
+    first = [m[0] if choose is None else choose(m, key=lambda model: _room(model.entry)) for m in found]
     models = [m for m in first if not m.entry.fixed and fits(m.entry)]
+    if choose is not None:
+        models.sort(key=lambda model: _room(model.entry), reverse=choose is max)
     for choice in (
         [m for m in models if synset(m.category) == synset_name and not m.category.startswith("half_")],
         [m for m in models if not m.category.startswith("half_")],
