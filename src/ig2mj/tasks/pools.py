@@ -29,6 +29,7 @@ from ig2mj.engine.registry import make_engine
 from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.process import entry_point, use_processor_only
 from ig2mj.process.progress import progress as shown
+from ig2mj.process.spawning import processes_for
 from ig2mj.sampling.many import sample
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.custom.code import NOTEBOOK
@@ -76,7 +77,7 @@ def pool_of(
     split: str = "train",
     count: int | None = None,
     *,
-    jobs: int = 1,
+    jobs: int | None = None,
     progress: ProgressCallback = no_progress,
     workers: concurrent.futures.Executor | None = None,
 ) -> Pool:
@@ -84,8 +85,8 @@ def pool_of(
 
     Args:
       split: "train" or "held_out". count: rows; None: `COUNT`.
-      jobs: processes; 0: one per processor. More than one needs a script that may be imported (the guard
-        `if __name__ == "__main__"`). workers: processes that several pools share (`sampling_processes`), instead.
+      jobs: processes; 0: one per processor; None: in a command of ig2mj as many as the rows are worth, else 1. More
+        than one needs a script that may be imported (the guard `if __name__ == "__main__"`). workers: processes that several pools share (`sampling_processes`), instead.
 
     Raises:
       UnknownNameError: no such split. EngineError: its start states cannot be sampled.
@@ -169,7 +170,7 @@ def make_pool(
     count: int | None = None,
     *,
     file: pathlib.Path,
-    jobs: int = 1,
+    jobs: int | None = None,
     progress: ProgressCallback = no_progress,
     workers: concurrent.futures.Executor | None = None,
 ) -> Pool:
@@ -182,15 +183,18 @@ def _pool(
     task: Task,
     split: str,
     count: int | None,
-    jobs: int,
+    jobs: int | None,
     progress: ProgressCallback,
     workers: concurrent.futures.Executor | None,
     file: pathlib.Path | None = None,
 ) -> Pool:
-    requested, processes = count or COUNT[split], jobs or os.cpu_count() or 1
+    requested = count or COUNT[split]
 
     def sample_rows(tried: int, rows: int) -> Iterator[tuple[int, Pool | None]]:
-        print(f"sampling {rows} start states of {task.name}, once{_hint(task, split, count)}", file=sys.stderr)
+        # A process that starts takes as long as some fifty rows.
+        processes = processes_for(rows // (2 * CHUNK)) if jobs is None else jobs or os.cpu_count() or 1
+        hint = _hint(task, split, count) if processes == 1 else ""
+        print(f"sampling {rows} start states of {task.name}, once{hint}", file=sys.stderr)
         made, first, limit = 0, tried, CHUNK * limit_of(requested)
         with contextlib.ExitStack() as stack_of:
             shared = workers
