@@ -86,7 +86,8 @@ def pool_of(
     Args:
       split: "train" or "held_out". count: rows; None: `COUNT`.
       jobs: processes; 0: one per processor; None: in a command of ig2mj as many as the rows are worth, else 1. More
-        than one needs a script that may be imported (the guard `if __name__ == "__main__"`). workers: processes that several pools share (`sampling_processes`), instead.
+        than one needs a script that may be imported (the guard `if __name__ == "__main__"`).
+      workers: processes that several pools share (`sampling_processes`), instead.
 
     Raises:
       UnknownNameError: no such split. EngineError: its start states cannot be sampled.
