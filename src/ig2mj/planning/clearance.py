@@ -214,29 +214,32 @@ def hand_way(
     start: np.ndarray,
     goal: np.ndarray,
     spare: float = 0.0,
-    back: np.ndarray | None = None,
 ) -> list[np.ndarray] | None:
     """Points of a hand's way from one point to another, without the first; None: no way was found.
 
-    Tried are the straight line, then ways up, across and down, then those that first draw the hand back.
+    Tried are the straight line, ways up, across and down, and one that is level first. Of each the last part comes
+    first, which is blocked most often.
 
     Args:
-      spheres, spare: see `straight`. back: where a hand is drawn back to first.
+      spheres, spare: see `straight`.
     """
-    starts: Sequence[list[np.ndarray]] = [[]] if back is None else [[], [np.asarray(back, float)]]
-    for before in starts:
-        first = before[-1] if before else start
-        ways = [[goal]]
-        for lift in LIFTS:
-            top = max(first[2], goal[2]) + lift
-            ways.append([np.array([*first[:2], top]), np.array([*goal[:2], top]), goal])
-            ways.append([np.array([*first[:2], goal[2]]), goal])
-        for way in ways:
-            points = [start, *before, *way]
-            pairs = list(itertools.pairwise(points))
-            if all(
-                straight(obstacles, spheres, a, b, spare if k == len(pairs) - 1 else 0.0)
-                for k, (a, b) in enumerate(pairs)
-            ):
-                return [*before, *way]
-    return None
+
+    def free(points: Sequence[np.ndarray]) -> bool:
+        ends = spare
+        for a, b in itertools.pairwise([goal, *reversed(points), start]):
+            if not straight(obstacles, spheres, b, a, ends):
+                return False
+            ends = 0.0
+        return True
+
+    if free([]):
+        return [goal]
+    level = [np.array([*start[:2], goal[2]])]
+    for lift in LIFTS:
+        top = max(start[2], goal[2]) + lift
+        over = np.array([*goal[:2], top])
+        if not straight(obstacles, spheres, over, goal, spare):
+            break  # higher ones lead through the same
+        if free(way := [np.array([*start[:2], top]), over]):
+            return [*way, goal]
+    return [*level, goal] if free(level) else None

@@ -79,8 +79,12 @@ def hand_path(
     way = hand_way(obstacles, spheres, start, goal, spare)
     if way is not None:
         return way
-    ends = [goal + apart * entry for apart in ENTRIES for entry in entries]
-    ends = [end for end in ends if straight(obstacles, spheres, end, goal, spare)]
+    ends = list[Vector]()
+    for entry in entries:
+        for apart in ENTRIES:
+            if not straight(obstacles, spheres, goal + apart * entry, goal, spare):
+                break  # farther ones lead through the same
+            ends.append(goal + apart * entry)
     for end in ends:
         way = hand_way(obstacles, spheres, start, end)
         if way is not None:
@@ -127,7 +131,7 @@ def rest(hand: int) -> Program:
     return [Phase(hand=hand, reset=True, close=False, until=Until.WAITED, limit=4)]
 
 
-SEARCHES = 6
+SEARCHES = 4
 """Ways of a hand that are searched for at most, where via points find none for any pose."""
 
 

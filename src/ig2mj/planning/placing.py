@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator
 
 import numpy as np
+from jaxtyping import Float
 
 from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp
 from ig2mj.planning.moves import (
     ATTEMPTS,
     LET_GO,
+    OVER,
     RETREAT,
     UP,
     Primitive,
@@ -28,12 +31,12 @@ from ig2mj.planning.moves import (
 from ig2mj.planning.opening import Tried, open_into
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import BODY, PlannedWorld, Spot, Stance
+from ig2mj.planning.world import BODY, PlannedWorld, Spot, Stance, Vector
 
 SPARE = 0.03
 """m before its place from which on an object may touch what is around."""
 
-STANCES, WAYS = 4, 60
+STANCES, WAYS = 3, 30
 """Stances for each spot, and ways of a hand that are looked for, at most."""
 
 
@@ -117,6 +120,14 @@ def _regrasp(world: PlannedWorld, name: str, hand: int) -> Generator[Program, st
     return taken.done
 
 
+def _has_room(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], goal: Vector) -> bool:
+    """Whether the hand with what it holds has room right before its place, on some side."""
+    turns = np.arange(8) * (np.pi / 4)
+    level = np.stack([np.cos(turns), np.sin(turns), np.zeros(8)], axis=1)
+    points = goal + np.concatenate([[OVER * UP], SPARE * np.concatenate([[UP], level])])
+    return any(obstacles.clear(np.column_stack([spheres[:, :3] + point, spheres[:, 3]])) for point in points)
+
+
 def bring_out(world: PlannedWorld, name: str) -> Primitive:
     """Puts an object onto open floor of the room where it is."""
     if name not in world.held:
@@ -140,6 +151,9 @@ def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int)
         for spot in world.spots(predicate, name, where):
             target, _, rotation = world.grip_for(hand, name, spot)
             spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+            if not _has_room(obstacles, spheres, target + LET_GO * UP):
+                lacking = _NO_WAY
+                continue
             lacking = _NO_STANCE if lacking == _NO_SPOT else lacking
             for stance in world.stances(hand, target, floor, world.away(spheres), most=STANCES):
                 lacking = _NO_WAY

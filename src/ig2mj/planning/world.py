@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ig2mj.agents.humanoid.frames import BODY_HEIGHT
 from ig2mj.agents.humanoid.robot import BODY_RADIUS
@@ -69,6 +69,9 @@ WALL = 0.02
 
 EACH, SPREAD = 4, 0.04
 """Spots of a placement in each area of its rule, and m between them, at least."""
+
+ROOFED, COLUMN = 1.0, np.arange(0.15, 0.8, 0.08)
+"""m of way that a spot counts as farther which nothing can be let down to, and heights above it that are looked at."""
 
 LATER_SPOTS = 12
 """Candidates of an area of which the predicate is asked, at most."""
@@ -444,6 +447,7 @@ class PlannedWorld:
         areas = PLACEMENTS[predicate](self.query, index, second)
         placer, farther = Placer(self.query), self._out_of_reach()
         middle = self._middle_of_fixed_part(where) if predicate == "inside" else None
+        around = self.obstacles([name])
         for quat in self._upright(name):
             for angle in TURNS:
                 new = _yawed(quat, angle)
@@ -451,8 +455,9 @@ class PlannedWorld:
                     found, asked = list[Vector](), 0
                     positions = np.array(list(placer.spots(index, areas, new, self.rng, support))).reshape(-1, 3)
                     cost = farther(positions)
-                    if middle is not None:  # away from where doors shut
+                    if middle is not None:  # below openings, and away from where doors shut
                         cost += np.linalg.norm((positions - middle)[:, :2], axis=1)
+                        cost += ROOFED * self._roofed(positions, around)
                     for k in np.argsort(cost, kind="stable"):
                         pos = positions[k]
                         if not np.isfinite(cost[k]) or len(found) == EACH or asked == LATER_SPOTS:
@@ -465,6 +470,13 @@ class PlannedWorld:
                             yield Spot(pos, new)
                     if found:
                         break
+
+    def _roofed(self, positions: Float[np.ndarray, "n 3"], around: Obstacles) -> Bool[np.ndarray, "n"]:
+        """Above which positions something is in the way of what is let down to them."""
+        if not len(positions):
+            return np.zeros(0, bool)
+        points = positions[:, None] + np.stack([np.zeros(len(COLUMN)), np.zeros(len(COLUMN)), COLUMN], axis=1)
+        return (around.distance(points.reshape(-1, 3)).reshape(points.shape[:2]) < CORNER).any(axis=1)
 
     def _out_of_reach(self) -> Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n"]]:
         """How far positions are from where a hand is comfortable, m, for a robot on floor that it has a way to;
