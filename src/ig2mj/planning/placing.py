@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.clearance import Obstacles, straight
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp
 from ig2mj.planning.moves import (
@@ -35,6 +35,9 @@ from ig2mj.planning.world import BODY, PlannedWorld, Spot, Stance, Vector
 
 SPARE = 0.03
 """m before its place from which on an object may touch what is around."""
+
+DEEP = 0.4
+"""m above a spot in a container that is open above, from which an object is let down to it."""
 
 STANCES, WAYS = 3, 30
 """Stances for each spot, and ways of a hand that are looked for, at most."""
@@ -144,19 +147,33 @@ _NO_WAY = "the hand has no way to a place where"
 def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int) -> tuple[Stance, Spot] | str:
     """A stance and a pose of the object's main body, of those with a way for the hand; else what is lacking."""
     obstacles, floor = world.obstacles([name]), world.floor()
-    lacking = _NO_SPOT
+    lacking, seen = _NO_SPOT, list[Stance]()
 
-    def candidates() -> Iterator[tuple[Stance, Spot]]:
+    def spots() -> Iterator[tuple[Spot, Vector, np.ndarray]]:
+        """Spots with room for the hand, with its grasp point and spheres; those that are open above, and that the hand
+        cannot be let down to, at last."""
         nonlocal lacking
+        last = []
         for spot in world.spots(predicate, name, where):
             target, _, rotation = world.grip_for(hand, name, spot)
             spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+            lacking = _NO_WAY if lacking == _NO_SPOT else lacking
             if not _has_room(obstacles, spheres, target + LET_GO * UP):
-                lacking = _NO_WAY
                 continue
-            lacking = _NO_STANCE if lacking == _NO_SPOT else lacking
+            found, over = (spot, target, spheres), target + (LET_GO + OVER) * UP
+            if predicate == "inside" and not spot.roofed and not straight(obstacles, spheres, over + DEEP * UP, over):
+                last.append(found)
+            else:
+                yield found
+        yield from last
+
+    def candidates() -> Iterator[tuple[Stance, Spot]]:
+        nonlocal lacking
+        for spot, target, spheres in spots():
+            lacking = _NO_STANCE if lacking == _NO_WAY and not seen else lacking
             for stance in world.stances(hand, target, floor, world.away(spheres), most=STANCES):
                 lacking = _NO_WAY
+                seen.append(stance)
                 yield stance, spot
 
     def has_way(candidate: tuple[Stance, Spot], search: bool) -> bool:

@@ -99,10 +99,12 @@ class Stance:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Spot:
-    """Where an object is to be: position (m) and orientation (w-x-y-z) of its main body, world frame."""
+    """Where an object is to be: position (m) and orientation (w-x-y-z) of its main body, world frame; `roofed`: inside
+    something, with a part of it above."""
 
     pos: Vector
     quat: Float[np.ndarray, "4"]
+    roofed: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -455,9 +457,10 @@ class PlannedWorld:
                     found, asked = list[Vector](), 0
                     positions = np.array(list(placer.spots(index, areas, new, self.rng, support))).reshape(-1, 3)
                     cost = farther(positions)
+                    roofed = np.zeros(len(positions), bool)
                     if middle is not None:  # below openings, and away from where doors shut
-                        cost += np.linalg.norm((positions - middle)[:, :2], axis=1)
-                        cost += ROOFED * self._roofed(positions, around)
+                        roofed = self._roofed(positions, around)
+                        cost += np.linalg.norm((positions - middle)[:, :2], axis=1) + ROOFED * roofed
                     for k in np.argsort(cost, kind="stable"):
                         pos = positions[k]
                         if not np.isfinite(cost[k]) or len(found) == EACH or asked == LATER_SPOTS:
@@ -467,7 +470,7 @@ class PlannedWorld:
                         asked += 1
                         if predicate in ("on_top", "on_floor") or self._would_hold(predicate, name, where, pos, new):
                             found.append(pos)
-                            yield Spot(pos, new)
+                            yield Spot(pos, new, bool(roofed[k]))
                     if found:
                         break
 
