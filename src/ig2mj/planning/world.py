@@ -479,7 +479,7 @@ class PlannedWorld:
         if not len(positions):
             return np.zeros(0, bool)
         points = positions[:, None] + np.stack([np.zeros(len(COLUMN)), np.zeros(len(COLUMN)), COLUMN], axis=1)
-        return (around.distance(points.reshape(-1, 3)).reshape(points.shape[:2]) < CORNER).any(axis=1)
+        return np.any(around.distance(points.reshape(-1, 3)).reshape(points.shape[:2]) < CORNER, axis=1)
 
     def _out_of_reach(self) -> Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n"]]:
         """How far positions are from where a hand is comfortable, m, for a robot on floor that it has a way to;
