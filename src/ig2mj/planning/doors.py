@@ -1,20 +1,27 @@
-"""Doors between rooms that are shut in a robot's way, found by the search for a way."""
+"""Doors between rooms that are shut in a robot's way: found by the search for a way, and opened."""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Callable, Generator
 
 import numpy as np
 from jaxtyping import Float
 
 from ig2mj.planning.bodies import HoveringBody
 from ig2mj.planning.motion_planner import NEAR_START
-from ig2mj.planning.moves import Primitive
+from ig2mj.planning.moves import Primitive, Program, free_hand
 from ig2mj.planning.occupancy import door_objects
-from ig2mj.planning.opening import joints_of
+from ig2mj.planning.opening import joints_of, move_joint
 from ig2mj.planning.steps import Step
 from ig2mj.planning.world import PlannedWorld
+
+MOST_DOORS = 6
+"""Doors that are opened for one primitive."""
+
+SWINGS, SWING, MOVED = 14, 0.3, 0.03
+"""Swings of a door at most; share of its range that it is moved in one; and from which on it has moved."""
 
 WIDE = 0.9
 """Share of its range from which on a door between rooms counts as wide open."""
@@ -26,12 +33,37 @@ BESIDE = 0.6
 """m between a way and the middle of a door's leaf that it leads through, at most."""
 
 
-def naming_doors(world: PlannedWorld, step: Step, inner: Primitive) -> Primitive:
-    """A primitive, whose failure to find floor or a way names the shut door that is in the way."""
-    outcome = yield from inner
-    if outcome.reason in ("no_base", "no_path") and (door := door_in_the_way(world, step)):
-        return dataclasses.replace(outcome, reason="no_path", detail=f"{door} is shut in the way")
+def through_doors(world: PlannedWorld, step: Step, action: Callable[[PlannedWorld, Step], Primitive]) -> Primitive:
+    """A primitive; where shut doors are in its way they are opened, and it begins again."""
+    outcome = yield from action(world, step)
+    for _ in range(MOST_DOORS):
+        door = door_in_the_way(world, step) if outcome.reason in ("no_base", "no_path") else None
+        if door is None:
+            return outcome
+        if detail := (yield from _swing(world, door, step)):
+            return dataclasses.replace(outcome, reason="no_path", detail=f"{door} is shut in the way{detail}")
+        outcome = yield from action(world, step)
     return outcome
+
+
+def _swing(world: PlannedWorld, door: str, step: Step) -> Generator[Program, str, str]:
+    """Opens a door by short swings, each from a new stance, until it is in the way no longer; why it is, in words."""
+    if not isinstance(world.body, HoveringBody):
+        return ""
+    if all(world.held):
+        return f", and the hands are full: {', '.join(world.held)}"
+    tried = 0
+    for attempt in range(SWINGS):
+        shut = [j for j in joints_of(world, door) if j.fraction < WIDE]
+        if not shut:
+            break
+        before, to = shut[0].fraction, min(shut[0].fraction + SWING, 1.0)
+        yield from move_joint(world, shut[0], free_hand(world, attempt), True, tried, to)
+        now = {j.name: j.fraction for j in joints_of(world, door)}[shut[0].name]
+        tried = 0 if now - before > MOVED else tried + attempt % 2
+        if door_in_the_way(world, step) != door:
+            return ""
+    return ", and no hand can move it"
 
 
 def door_in_the_way(world: PlannedWorld, step: Step) -> str | None:

@@ -126,14 +126,14 @@ def _move_one(
 
 
 def move_joint(
-    world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int = 0
+    world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int = 0, to: float = OPEN_TO
 ) -> Generator[Program, str, tuple[str, str]]:
     """Opens or closes one door, drawer or lid; returns why it did not, as a reason and in words.
 
     Args:
-      tried: ways that have failed, which are left out.
+      tried: ways that have failed, which are left out. to: share of its range to which it is opened.
     """
-    found = _plan(world, joint, hand, value, tried)
+    found = _plan(world, joint, hand, value, tried, to)
     if found is None:
         return "no_base", f"no free floor from which a hand can move {joint.name}"
     if reason := (yield from go(world, found.stance)):
@@ -173,12 +173,12 @@ class _JointPlan:
     pulls: bool
 
 
-def _ways(joint: OpenableJoint, value: bool) -> list[tuple[tuple[FaceGrip, ...], float, bool]]:
+def _ways(joint: OpenableJoint, value: bool, to: float = OPEN_TO) -> list[tuple[tuple[FaceGrip, ...], float, bool]]:
     """Grips, share of the joint's range to which they move it, and whether the hand pulls: a door is pulled open by its
     outer face or its edge, and pushed shut by its outer face. Where no floor is free before that, it is pulled by its
     edge until it is nearly shut, or by its inner face until it is ajar."""
     if value:
-        return [(joint.grips, OPEN_TO, True), (joint.edges, OPEN_TO, True), (joint.inner_grips, OPEN_TO, False)]
+        return [(joint.grips, to, True), (joint.edges, to, True), (joint.inner_grips, to, False)]
     ways = [(joint.grips, 0.0, False)]
     if not joint.hinge:
         ways.append((joint.edges, 0.0, True))
@@ -189,10 +189,12 @@ def _ways(joint: OpenableJoint, value: bool) -> list[tuple[tuple[FaceGrip, ...],
     return [*ways, (joint.grips, 0.0, True)]
 
 
-def _plan(world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int) -> _JointPlan | None:
+def _plan(
+    world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int, to: float = OPEN_TO
+) -> _JointPlan | None:
     floor, obstacles = world.floor(), world.obstacles()
     passed = 0
-    for grips, fraction, pulls in _ways(joint, value):
+    for grips, fraction, pulls in _ways(joint, value, to):
         count, sweep = 0, joint.sweep(fraction)[:, :2]
         for grip in grips:
             places = joint.path(grip, fraction)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from ig2mj.planning.bodies import WheeledBody
 from ig2mj.planning.cleaning import clean
-from ig2mj.planning.doors import naming_doors
+from ig2mj.planning.doors import through_doors
 from ig2mj.planning.driving import drive_near, go
 from ig2mj.planning.grasping import grasp, is_graspable, release
 from ig2mj.planning.moves import Primitive, PrimitiveFailed
@@ -26,7 +26,7 @@ from ig2mj.planning.world import AWAY, PlannedWorld
 
 def primitive(world: PlannedWorld, step: Step) -> Primitive:
     """What a robot does for a step."""
-    return naming_doors(world, step, _tried_again(world, step))
+    return through_doors(world, step, _tried_again)
 
 
 BROUGHT_OUT = ("open", "close", "toggle_on", "toggle_off", "wipe", "scrub", "slice")
