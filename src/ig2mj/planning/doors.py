@@ -10,12 +10,15 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.planning.bodies import HoveringBody
-from ig2mj.planning.motion_planner import NEAR_START
+from ig2mj.planning.motion_planner import NEAR_START, FreeFloor, Point
 from ig2mj.planning.moves import Primitive, Program, free_hand
 from ig2mj.planning.occupancy import door_objects
 from ig2mj.planning.opening import joints_of, move_joint
 from ig2mj.planning.steps import Step
 from ig2mj.planning.world import PlannedWorld
+
+LOOKED_AT = 60
+"""Places near what a step is about from which it is looked whether a wall is in between, about."""
 
 MOST_DOORS = 6
 """Doors that are opened for one primitive."""
@@ -75,16 +78,12 @@ def door_in_the_way(world: PlannedWorld, step: Step) -> str | None:
         return None
     here, _ = world.base
     floor, reach = world.floor(), world.body.reach if isinstance(world.body, HoveringBody) else NEAR
-    cells = floor.within(point[:2], reach)
-    if np.isfinite(floor.distances(here, NEAR_START)[tuple(cells.T)]).any():
+    if _nearest(world, floor, point, reach) is not None:
         return None
     held = [world.index(n) for n in world.held if n and not world.domain.fixed(n)]
     freed = world.planner.floor(world.view, without=[*held, *doors], world=world.world)
-    cells = freed.within(point[:2], reach)
-    away = freed.distances(here, NEAR_START)[tuple(cells.T)]
-    if not np.isfinite(away).any():
-        return None
-    way = freed.way(here, freed.occupancy.middles(cells[int(np.argmin(away))]))
+    goal = _nearest(world, freed, point, reach)
+    way = None if goal is None else freed.way(here, goal)
     if way is None:
         return None
     lines = [(a, b, max(2, int(np.linalg.norm(b - a) / 0.05))) for a, b in itertools.pairwise(way)]
@@ -96,6 +95,21 @@ def door_in_the_way(world: PlannedWorld, step: Step) -> str | None:
         if len(near):
             passed.append((int(near[0]), names[door]))
     return min(passed)[1] if passed else None
+
+
+def _nearest(world: PlannedWorld, floor: FreeFloor, point: Float[np.ndarray, "3"], reach: float) -> Point | None:
+    """Floor to which the robot can drive, within reach of a point and on the same side of all walls, the nearest along
+    the floor."""
+    here, _ = world.base
+    cells = floor.within(point[:2], reach)
+    away = floor.distances(here, NEAR_START)[tuple(cells.T)]
+    middles, obstacles = floor.occupancy.middles(cells), world.obstacles()
+    for k in np.argsort(away)[:: max(1, len(away) // LOOKED_AT)]:
+        if not np.isfinite(away[k]):
+            return None
+        if not world.behind_wall(obstacles, middles[k], point):
+            return middles[k]
+    return None
 
 
 def _is_wide(world: PlannedWorld, door: str) -> bool:

@@ -377,7 +377,7 @@ class PlannedWorld:
         cost += np.where(np.isnan(rise), np.inf, EFFORT * np.abs(rise))
         count, obstacles = 0, self.obstacles()
         while len(cost) and np.isfinite(cost[best := int(np.argmin(cost))]):
-            if self._behind_wall(obstacles, middles[best], point) or not self._stretches(
+            if self.behind_wall(obstacles, middles[best], point) or not self._stretches(
                 obstacles, middles[best], rise[best]
             ):
                 cost[best] = np.inf
@@ -396,7 +396,7 @@ class PlannedWorld:
         points = np.array([[*xy, top], [*xy, top + rise]])
         return bool((obstacles.distance(points) > BODY_RADIUS).all())
 
-    def _behind_wall(self, obstacles: Obstacles, xy: Float[np.ndarray, "2"], point: Vector) -> bool:
+    def behind_wall(self, obstacles: Obstacles, xy: Float[np.ndarray, "2"], point: Vector) -> bool:
         """Whether a wall stands between a robot and a point."""
         start = np.array([*xy, point[2]])
         apart = float(np.linalg.norm(point - start))
