@@ -21,6 +21,7 @@ from ig2mj.knowledge.taxonomy import (
     synsets,
     taxonomy,
 )
+from ig2mj.process.public_names import offer_modules
 
 __all__ = [
     "ABILITIES",
@@ -43,3 +44,5 @@ __all__ = [
     "synsets",
     "taxonomy",
 ]
+
+offer_modules(__name__)
