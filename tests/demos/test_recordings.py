@@ -20,6 +20,7 @@ from ig2mj.demos.compact import write_compact
 from ig2mj.demos.metrics import metrics_of
 from ig2mj.demos.observing import observe
 from ig2mj.demos.origin import origin_of
+from ig2mj.demos.writer import RunWriter
 from ig2mj.envs.experts import expert_of
 from ig2mj.errors import InputError
 from ig2mj.scene.paths import SHIPPED_HOMES
@@ -358,6 +359,16 @@ def test_truncated_and_foreign_files_end_in_one_line(recorded, tmp_path, capsys)
         assert call(["demos", "replay", str(file)]) == 2
         lines = capsys.readouterr().err.strip().splitlines()
         assert len(lines) == 1 and str(file) in lines[0]
+
+
+def test_a_place_that_cannot_be_written_says_why(tmp_path):
+    """In the system's words, without those of HDF5."""
+    for file, why in ((tmp_path / "none" / "x.h5", "No such file or directory"), (tmp_path, "Is a directory")):
+        with pytest.raises(InputError, match=rf"cannot be written: {why} \(choose another place\)$"):
+            RunWriter(file, {}, {}, ["a"], ["action"])
+    file = tmp_path / "x.h5"
+    with h5py.File(file, "w"), pytest.raises(InputError, match="it is open already"):
+        RunWriter(file, {}, {}, ["a"], ["action"])
 
 
 KILLED = """

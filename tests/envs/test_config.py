@@ -141,5 +141,7 @@ def test_a_horizon_is_in_agent_steps_whatever_the_period():
     env = ig2mj.make("PointNavigation", {**SMALL, "horizon": 7, "period": 1 / 30})
     assert env.task.horizon == env.config.horizon == 7
     assert env.with_horizon(9).config.horizon == 9
+    with pytest.raises(EngineError, match="observations = 3: names of observations"):
+        ig2mj.make("PointNavigation", {**SMALL, "observations": 3})
     with pytest.raises(EngineError, match="horizon = 0"):
         ig2mj.make("PointNavigation", {**SMALL, "horizon": 0})

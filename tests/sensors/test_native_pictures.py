@@ -13,6 +13,7 @@ from ig2mj.agents.humanoid import Humanoid
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process.opengl import GL_BACKENDS, probe_gl
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
+from ig2mj.sensors.gl_canvas import Canvas
 from ig2mj.sensors.labels import PARTICLES, class_names, class_of_category
 from ig2mj.sensors.native_camera import NativeCamera
 from ig2mj.states import particles
@@ -170,3 +171,8 @@ def test_mistakes_are_typed(world):
         NativeCamera(world.engine, world.model, ["humanoid/ey"])
     with pytest.raises(EngineError, match="a camera must have pixels"):
         NativeCamera(world.engine, world.model, [])
+
+
+def test_images_that_opengl_cannot_hold_are_refused_with_their_size(world):
+    with pytest.raises(EngineError, match="cannot render images of 60000x60000 pixels"):
+        Canvas(world.engine.scene.model.__copy__(), 60000, 60000, GROUPS, 0)

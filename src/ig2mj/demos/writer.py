@@ -15,6 +15,7 @@ and once where runs start alike. At most `FLUSH` frames of each world are buffer
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
 import os
 import pathlib
@@ -277,4 +278,11 @@ def _created(file: pathlib.Path) -> Any:
     try:
         return h5py.File(file, "w", libver=("v108", "v108"))
     except OSError as e:
-        raise InputError(file, f"cannot be written: {' '.join(str(e).split())}", fix="choose another place") from e
+        raise InputError(file, f"cannot be written: {_why(e)}", fix="choose another place") from e
+
+
+def _why(error: OSError) -> str:
+    """What the system says, without HDF5's text around it."""
+    if "already open" in str(error) or (error.errno in (errno.EAGAIN, errno.EACCES) and "lock" in str(error)):
+        return "it is open already, here or in another program"
+    return os.strerror(error.errno) if error.errno else " ".join(str(error).split())

@@ -16,7 +16,7 @@ import dataclasses
 import importlib
 import inspect
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, Unpack, cast, overload
 
 from ig2mj.agents.base import ACTION_PERIOD
@@ -215,6 +215,8 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         task = in_home(task, config.home)
     objects = object_texts(config.objects)
     single = isinstance(config.observations, str) or callable(config.observations)
+    if not single and not isinstance(config.observations, Iterable):
+        raise EngineError(f"observations = {config.observations!r}: names of observations, or a single one")
     observations = cast("tuple[Any, ...]", (config.observations,) if single else tuple(config.observations))
     mode = task.grasping if config.grasping is None else config.grasping
     if mode not in MODES:

@@ -3,12 +3,14 @@ abort the process that tries it."""
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 
-from ig2mj.errors import MissingDependencyError
+from ig2mj.errors import EngineError, MissingDependencyError
 from ig2mj.process.settings import GL_INSTALL_HINT, use_gl, used_gl
 
 GL_BACKENDS = ("egl", "osmesa")
@@ -39,6 +41,17 @@ def use_opengl() -> str:
             use_gl(name)
             return name
     raise MissingDependencyError(f"OpenGL without a display does not work on this machine; try: {GL_INSTALL_HINT}")
+
+
+@contextlib.contextmanager
+def images_of(width: int, height: int) -> Iterator[None]:
+    """For the block that makes an OpenGL context for images. Raises EngineError: images of this size cannot be made."""
+    import mujoco
+
+    try:
+        yield
+    except mujoco.FatalError as e:
+        raise EngineError(f"OpenGL cannot render images of {width}x{height} pixels here: {e}") from None
 
 
 @functools.cache

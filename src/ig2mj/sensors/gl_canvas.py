@@ -8,7 +8,7 @@ import weakref
 import mujoco
 import numpy as np
 
-from ig2mj.process.opengl import use_opengl
+from ig2mj.process.opengl import images_of, use_opengl
 from ig2mj.sensors.images import NOTHING
 from ig2mj.sensors.particle_slots import Slots
 from ig2mj.sensors.render_model import BACKGROUND, SPARE_DIRECTIONS, SPARE_LIGHT
@@ -38,6 +38,7 @@ class Canvas:
 
         Raises:
           MissingDependencyError: no OpenGL without a display works here.
+          EngineError: images of this size cannot be made.
         """
         use_opengl()
         from mujoco.rendering.classic import gl_context
@@ -55,7 +56,8 @@ class Canvas:
             others[:] = 0
         self._gl = gl_context.GLContext(width, height)
         self._gl.make_current()
-        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        with images_of(width, height):
+            self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         self._rect = mujoco.MjrRect(0, 0, width, height)

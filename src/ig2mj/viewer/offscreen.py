@@ -22,8 +22,8 @@ import mujoco
 import numpy as np
 
 from ig2mj.engine.base import whole_number
-from ig2mj.errors import EngineError, MissingDependencyError, UnknownNameError
-from ig2mj.process.opengl import GL_BACKENDS, PROBE_XML, fault_of_probe, probe_gl, run_probe
+from ig2mj.errors import MissingDependencyError, UnknownNameError
+from ig2mj.process.opengl import GL_BACKENDS, PROBE_XML, fault_of_probe, images_of, probe_gl, run_probe
 from ig2mj.process.settings import GL_INSTALL_HINT, use_gl, used_gl
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 
@@ -204,9 +204,8 @@ def _renderer_for(model: mujoco.MjModel, width: int, height: int) -> mujoco.Rend
     keep = (size.offwidth, size.offheight)
     size.offwidth, size.offheight = max(width, keep[0]), max(height, keep[1])
     try:
-        renderer = mujoco.Renderer(model, height, width, max_geom=2 * model.ngeom + model.nsite + 1000)
-    except mujoco.FatalError as e:
-        raise EngineError(f"OpenGL cannot draw an image of {width}x{height} pixels: {e}") from None
+        with images_of(width, height):
+            renderer = mujoco.Renderer(model, height, width, max_geom=2 * model.ngeom + model.nsite + 1000)
     finally:
         size.offwidth, size.offheight = keep
     _renderers[key] = renderer

@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, UInt8
 from scipy.spatial.transform import Rotation
 
 from ig2mj.geometry.frustum import spheres_in_view
-from ig2mj.process.opengl import use_opengl
+from ig2mj.process.opengl import images_of, use_opengl
 from ig2mj.scene.geom_groups import HIDDEN_GROUP, VISIBLE_GROUPS
 from ig2mj.scene.scene import Scene
 from ig2mj.vr.frames import Pose
@@ -90,7 +90,8 @@ class StereoImages:
         self._turns = Rotation.from_quat(np.roll(model.geom_quat[self._geoms], -1, axis=1))
         self.context = gl_context.GLContext(2 * width, height)
         self.context.make_current()
-        self.renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        with images_of(2 * width, height):
+            self.renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self.renderer)
         self._option, self._camera = mujoco.MjvOption(), mujoco.MjvCamera()
         for group in range(mujoco.mjNGROUP):
