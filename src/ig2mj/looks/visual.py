@@ -21,6 +21,7 @@ from ig2mj.looks.light import DAY, NIGHT, Light, set_light
 from ig2mj.looks.materials import Material
 from ig2mj.looks.mesh import Builder, Triangles
 from ig2mj.looks.outside import add_outside
+from ig2mj.looks.state_looks import add_lamps, add_tinted_materials, lamp_lights
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN, Scene, check_looks
 
@@ -57,7 +58,7 @@ class Visual:
 
     Attributes:
       model: the scene's model and what is added; the scene's own where the looks are plain.
-      owner: object of each geom, -1 for none.
+      owner: object of each geom, -1 for none. lamps: numbers of lights of lamps.
     """
 
     def __init__(self, scene: Scene, looks: str):
@@ -68,7 +69,7 @@ class Visual:
         self.light: Light | None = LIGHTS.get(looks)
         self.model = scene.model if looks == PLAIN else _compiled(scene, looks)
         self._base = self.model.geom_rgba.copy(), self.model.geom_matid.copy()
-        self.followers = Followers(scene, self.model)
+        self.followers, self.lamps = Followers(scene, self.model), lamp_lights(self.model)
         owners = visual_owners(scene, self.model, self.model.ngeom)
         self.owner: Int[np.ndarray, "G"] = np.concatenate([scene.tables.geom_object, owners])
         self._data: mujoco.MjData | None = None
@@ -93,6 +94,10 @@ class Visual:
             pos, axes = self.followers.poses(data.xpos[None], data.xmat.reshape(1, -1, 3, 3))
             mine.geom_xpos[self.followers.geoms] = pos[0]
             mine.geom_xmat[self.followers.geoms] = axes[0].reshape(-1, 9)
+        for light in self.lamps:
+            body = self.model.light_bodyid[light]
+            turned = data.xmat[body].reshape(3, 3) @ self.model.light_pos[light]
+            mine.light_xpos[light] = data.xpos[body] + turned
         (rgba, material), (base_rgba, base_material) = self._plain, self._base
         changed = np.flatnonzero((model.geom_rgba != rgba).any(axis=1) | (model.geom_matid != material))
         self.model.geom_rgba[:], self.model.geom_matid[:] = base_rgba, base_material
@@ -122,6 +127,8 @@ def decorate(spec: mujoco.MjSpec, scene: Scene, looks: str) -> None:
     light = LIGHTS[looks]
     set_light(spec, light)
     _dress(spec, scene)
+    add_tinted_materials(spec, scene)
+    add_lamps(spec, scene)
     build, plan = Builder(), read_plan(scene)
     if plan is None:
         return

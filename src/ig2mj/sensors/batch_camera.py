@@ -30,6 +30,7 @@ from ig2mj.engine.warp.patches import graphs_kept, pins
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.looks.costume import Followers
+from ig2mj.looks.state_looks import OF_MATERIAL, lamp_geoms, tinted_materials
 from ig2mj.looks.visual import visual_owners
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN
@@ -39,7 +40,7 @@ from ig2mj.sensors.particle_slots import Slots, fill_slots
 from ig2mj.sensors.ray_cameras import sectors_of, set_rays, set_rows
 from ig2mj.sensors.render_model import BACKGROUND, make_render_model, mean_colours
 from ig2mj.sensors.texture_filter import fit_textures
-from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
+from ig2mj.sensors.tints import STATES, SWITCHED_ON, UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.draw import SPARE_LIGHTS, Draw
@@ -312,6 +313,8 @@ class BatchCamera:
         self._added = _f32(start.geom_xpos[known:count]), _f32(start.geom_xmat[known:count]).reshape(-1, 3, 3)
         self._rgba, self._mean = _f32(host.geom_rgba), mean_colours(host, np.arange(host.ngeom))
         self._material = np.array(host.geom_matid, np.int32)
+        self._in_tint, self._lamps = tinted_materials(host, STATES), lamp_geoms(host)
+        self._active = np.array(host.light_active, bool)
         self._size = np.array(host.geom_size, np.float32)
         self._camera_in_body = (host.cam_bodyid, _f32(host.cam_pos), _f32(host.cam_quat))
         self._light_in_body = (host.light_bodyid, _f32(host.light_pos), _f32(host.light_dir))
@@ -371,7 +374,8 @@ class BatchCamera:
         return [pos], [axes]
 
     def _look(self, physics: MjxPhysics, states: ExtendedStates, slots: Slots) -> dict[str, Array]:
-        """Fields of the model that differ per world: colour and material of tinted geoms, size and colour of slots."""
+        """Fields of the model that differ per world: colour and material of tinted geoms, size and colour of slots,
+        and which lamps are on."""
         worlds, geoms = self.engine.num_worlds, len(self._mean) - self.slots
         tint = tints_of_geoms(tints(self.model, states), self._owner[:geoms])
         own = physics.fields.geom_rgba
@@ -386,19 +390,28 @@ class BatchCamera:
         rgba = jnp.where((tint == UNTINTED)[..., None], rgba, in_tint)
         of_slots = jnp.concatenate([slots.colour, jnp.ones_like(slots.colour[..., :1])], axis=-1)
         material = jnp.where(tint == UNTINTED, base, -1)
+        if (self._in_tint >= 0).any():
+            in_tint = jnp.asarray(self._in_tint[:, :geoms])[jnp.maximum(tint, 0), jnp.arange(geoms)]
+            textured = (tint != UNTINTED) & (in_tint >= 0)
+            material = jnp.where(textured, in_tint, material)
+            rgba = jnp.where(textured[..., None], jnp.asarray(OF_MATERIAL), rgba)
         plain = jnp.full((worlds, self.slots), -1, material.dtype)
         size = jnp.broadcast_to(jnp.asarray(self._size[:geoms]), (worlds, geoms, 3))
-        more = {}
-        if (own := fields.mat_rgba) is not None:
-            added = jnp.broadcast_to(
-                self._model.mat_rgba[own.shape[-2] :], (worlds, self._host.nmat - own.shape[-2], 4)
-            )
-            more["mat_rgba"] = jnp.concatenate([own, added], axis=1)
-        return more | {
+        look = {
             "geom_rgba": jnp.concatenate([rgba, of_slots], axis=1),
             "geom_matid": jnp.concatenate([material, plain], axis=1),
             "geom_size": jnp.concatenate([size, slots.size], axis=1),
         }
+        if (own := fields.mat_rgba) is not None:
+            added = jnp.broadcast_to(
+                self._model.mat_rgba[own.shape[-2] :], (worlds, self._host.nmat - own.shape[-2], 4)
+            )
+            look["mat_rgba"] = jnp.concatenate([own, added], axis=1)
+        if self._lamps:
+            lights, of = (np.array(column) for column in zip(*self._lamps, strict=True))
+            on = jnp.broadcast_to(jnp.asarray(self._active), (worlds, len(self._active)))
+            look["light_active"] = on.at[:, lights].set(tint[:, of] == SWITCHED_ON)
+        return look
 
     def _of_draw(self, draw: Draw) -> dict[str, Array]:
         """Fields of the model that lights and fields of view are."""

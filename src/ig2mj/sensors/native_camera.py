@@ -23,13 +23,14 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.frustum import spheres_in_view
 from ig2mj.looks import visual_of
+from ig2mj.looks.state_looks import OF_MATERIAL, lamp_geoms, tinted_materials
 from ig2mj.scene.geom_groups import HIDDEN_GROUP, VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.gl_canvas import Canvas
 from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, check_request
 from ig2mj.sensors.particle_slots import Slots, fill_slots
 from ig2mj.sensors.render_model import mean_colours
-from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
+from ig2mj.sensors.tints import STATES, SWITCHED_ON, UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.draw import Draw
@@ -80,6 +81,7 @@ class NativeCamera:
         self._plain = mean_colours(self._drawn, np.arange(self._drawn.ngeom))
         self._material, self._group = self._drawn.geom_matid.copy(), self._drawn.geom_group.copy()
         self._fovy = self._drawn.cam_fovy.copy()
+        self._in_tint, self._lamps = tinted_materials(self._drawn, STATES), lamp_geoms(self._drawn)
         self._canvas: Canvas | None = None
         self._look = engine.compile(self._look_fn)
 
@@ -171,14 +173,20 @@ class NativeCamera:
         self._drawn.geom_matid[changed] = live.geom_matid[changed]
 
     def _tint(self, tint: Int[np.ndarray, "O"]) -> None:
-        """Gives geoms of objects whose state shows their mean colours, tinted, in place of texture and material."""
+        """Gives geoms of objects whose state shows the materials of their tints, or their mean colours, tinted."""
+        for light, _ in self._lamps:
+            self._drawn.light_active[light] = False
         if (tint == UNTINTED).all():
             return
         of_geoms = np.asarray(tints_of_geoms(tint[None], self._visual.owner))[0]
         geoms = np.flatnonzero(of_geoms != UNTINTED)
         self._drawn.geom_rgba[geoms, :3] = np.asarray(tinted(self._plain[geoms, :3], of_geoms[None, geoms]))[0]
         self._drawn.geom_rgba[geoms, 3] = self._plain[geoms, 3] > 0
-        self._drawn.geom_matid[geoms] = -1
+        material = self._in_tint[of_geoms[geoms], geoms]
+        self._drawn.geom_matid[geoms] = material
+        self._drawn.geom_rgba[geoms[material >= 0]] = OF_MATERIAL
+        for light, geom in self._lamps:
+            self._drawn.light_active[light] = of_geoms[geom] == SWITCHED_ON
 
     def _draw(
         self,

@@ -2,7 +2,8 @@
 and of dust, stains and water. Their one home; cameras and viewers take them from here.
 
 Of the states that are true the first of `TINTS` is shown. iGibson mixes the state's colour into the object's texture;
-here it is mixed into the object's colour, per world.
+here it is mixed into the object's colour, per world, and on decorated homes into its texture
+(`ig2mj.looks.state_looks`).
 
 Axes: W worlds, O objects, G geoms.
 """
@@ -16,6 +17,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
+from ig2mj.looks.state_looks import MIXTURES, Mixture
 from ig2mj.predicates.base import Predicate
 from ig2mj.predicates.definitions.burnt import BURNT
 from ig2mj.predicates.definitions.cooked import COOKED
@@ -27,21 +29,15 @@ from ig2mj.states.world import ExtendedStates
 
 
 @dataclasses.dataclass(frozen=True)
-class Tint:
-    """(1 - weight) x the object's colour + weight x `colour`, all times `brightness`; colour is 0..1."""
+class Tint(Mixture):
+    """How objects look in which a predicate is true. See `ig2mj.looks.state_looks.Mixture`."""
 
-    predicate: Predicate
-    weight: float
-    colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    brightness: float = 1.0
+    predicate: Predicate = dataclasses.field(kw_only=True)
 
 
-TINTS = (
-    Tint(FROZEN, 0.8, (1.0, 1.0, 1.0)),
-    Tint(BURNT, 0.8, (0.0, 0.0, 0.0)),
-    Tint(COOKED, 0.5, (139 / 255, 69 / 255, 19 / 255)),
-    Tint(SOAKED, 0.5, (0.0, 0.0, 200 / 255)),
-    Tint(TOGGLED_ON, 0.0, brightness=1.5),
+TINTS = tuple(
+    Tint(**dataclasses.asdict(MIXTURES[predicate.name]), predicate=predicate)
+    for predicate in (FROZEN, BURNT, COOKED, SOAKED, TOGGLED_ON)
 )
 """Highest priority first, as in iGibson."""
 
@@ -67,6 +63,12 @@ def tints(model: StateModel, states: ExtendedStates) -> Int[Array, "W O"]:
         true.append(jnp.asarray(of_states(model, states)) & able)
     stacked = jnp.stack(true, axis=-1)  # one column for each tint
     return jnp.where(stacked.any(-1), jnp.argmax(stacked, axis=-1), UNTINTED)
+
+
+STATES = tuple(tint.predicate.name for tint in TINTS)
+"""Names of the states, in the order of `TINTS`."""
+
+SWITCHED_ON = STATES.index("toggled_on")
 
 
 def tints_of_geoms(tint: Int[Array, "W O"], owner: Int[np.ndarray, "G"]) -> Int[Array, "W G"]:

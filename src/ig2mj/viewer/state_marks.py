@@ -1,7 +1,7 @@
 """How states look: tints of objects, and marks for dust, stains and water drops.
 
-MuJoCo multiplies a geom's colour into its texture, so a tinted geom loses its texture and shows its mean colour, tinted
-(`ig2mj.sensors.tints`).
+MuJoCo multiplies a geom's colour into its texture, so a tinted geom of a home without looks shows its mean colour,
+tinted (`ig2mj.sensors.tints`). In a decorated home it shows its texture, tinted (`ig2mj.looks.state_looks`).
 """
 
 from __future__ import annotations
@@ -15,10 +15,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ig2mj.engine.view import PhysicsView
+from ig2mj.looks.state_looks import OF_MATERIAL, lamp_geoms, tinted_materials
 from ig2mj.sensors.render_model import mean_colours
 from ig2mj.sensors.tints import (
     DUST_COLOUR,
     STAIN_COLOUR,
+    STATES,
+    SWITCHED_ON,
     UNTINTED,
     WATER_ALPHA,
     WATER_COLOUR,
@@ -101,6 +104,8 @@ class Tinter:
         self._model, self._owner = model, np.asarray(owner)
         self._rgba, self._material = model.geom_rgba.copy(), model.geom_matid.copy()
         self._mean = np.full((model.ngeom, 4), np.nan, np.float32)  # taken when first asked for: textures are large
+        self._in_tint = tinted_materials(model, STATES)
+        self._lamps = lamp_geoms(model)
 
     def apply(self, tint: Int[np.ndarray, "O"]) -> None:
         """Shows `tint_of_objects`."""
@@ -112,10 +117,18 @@ class Tinter:
         rgba = self._mean[geoms]
         rgba[:, :3] = np.asarray(tinted(rgba[:, :3], of_geoms[None, geoms]))[0]
         self._model.geom_rgba[geoms], self._model.geom_matid[geoms] = rgba, -1
+        material = self._in_tint[of_geoms[geoms], geoms]
+        textured = material >= 0
+        self._model.geom_matid[geoms[textured]] = material[textured]
+        self._model.geom_rgba[geoms[textured]] = OF_MATERIAL
+        for light, geom in self._lamps:
+            self._model.light_active[light] = of_geoms[geom] == SWITCHED_ON
 
     def restore(self) -> None:
         """Gives the geoms their own colours back."""
         self._model.geom_rgba[:], self._model.geom_matid[:] = self._rgba, self._material
+        for light, _ in self._lamps:
+            self._model.light_active[light] = False
 
     @contextlib.contextmanager
     def shown(self, tint: Int[np.ndarray, "O"]) -> Iterator[None]:
