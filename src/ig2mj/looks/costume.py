@@ -109,6 +109,12 @@ class Followers:
     def __len__(self) -> int:
         return len(self.geoms)
 
+    @property
+    def riders(self) -> dict[int, int]:
+        """Geoms that are fixed to a body, each with that body; the others are of arms."""
+        found = zip(self.geoms.tolist(), self._body, self._bone, strict=True)
+        return {geom: body for geom, body, bone in found if not bone}
+
     def poses(self, pos: Float[Any, "W B 3"], axes: Float[Any, "W B 3 3"], xp: Any = np) -> tuple[Any, Any]:
         """Positions [W, F, 3] and rotation matrices [W, F, 3, 3] of the geoms, world frame.
 

@@ -7,6 +7,7 @@ Nothing casts shadows; those of furniture and corners are in textures (`surfaces
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -80,12 +81,33 @@ def _set(one, direction: Vector, colour: Vector) -> None:
     one.castshadow, one.active = False, True
 
 
-def shade(normals: np.ndarray, light: Light, emission: float | int = 0.0) -> np.ndarray:
-    """What falls on surfaces with these normals [V, 3], rgb of 0..1 [V, 3]."""
+@dataclasses.dataclass(frozen=True)
+class Bulb:
+    """A lamp that is on. Attributes: pos: m, world. rgb: 0..1. reach: attenuation: constant, linear, quadratic."""
+
+    pos: tuple[float, ...]
+    rgb: tuple[float, ...]
+    reach: tuple[float, ...]
+
+
+def shade(
+    normals: np.ndarray,
+    light: Light,
+    emission: float | int = 0.0,
+    points: np.ndarray | None = None,
+    bulbs: Sequence[Bulb] = (),
+) -> np.ndarray:
+    """What falls on surfaces with these normals [V, 3], rgb of 0..1 [V, 3]. points: [V, 3], m, needed for bulbs."""
     total = np.tile(np.asarray(light.ambient) + emission, (len(normals), 1))
     for direction, colour in light.lamps:
         d = np.asarray(direction) / np.linalg.norm(direction)
         total += np.maximum(-(normals @ d), 0)[:, None] * np.asarray(colour)
+    for bulb in bulbs:
+        assert points is not None, "the light of bulbs depends on where a surface is"
+        to = np.asarray(bulb.pos) - points
+        far = np.maximum(np.linalg.norm(to, axis=1), 1e-6)
+        strength = np.maximum((normals * to).sum(1) / far, 0) / (np.array(bulb.reach) @ [far**0, far, far**2])
+        total += strength[:, None] * np.asarray(bulb.rgb)
     return np.clip(total, 0, 1)
 
 

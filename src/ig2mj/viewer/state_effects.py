@@ -9,7 +9,7 @@ import math
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.sensors.tints import TINTS, WATER_COLOUR
@@ -44,11 +44,17 @@ _NAMES = tuple(tint.predicate.name for tint in TINTS)
 
 
 def effects(
-    model: StateModel, states: ExtendedStates, view: PhysicsView, world: int = 0, time: float | int = 0.0
+    model: StateModel,
+    states: ExtendedStates,
+    view: PhysicsView,
+    world: int = 0,
+    time: float | int = 0.0,
+    tint: Int[np.ndarray, "O"] | None = None,
 ) -> list[Mark]:
-    """Marks of one world. time: s, by which steam moves."""
+    """Marks of one world. time: s, by which steam moves. tint: `tint_of_objects`; None: it is computed."""
     found = list[Mark]()
-    tint, temperature = tint_of_objects(model, states, world), np.asarray(states.temperature)[world]
+    tint = tint_of_objects(model, states, world) if tint is None else tint
+    temperature = np.asarray(states.temperature)[world]
     tables, thermal = model.tables, model.parameters.thermal
     low, high = (np.asarray(getattr(view, name))[world] for name in ("aabb_low", "aabb_high"))
     for k in range(tables.num_objects):

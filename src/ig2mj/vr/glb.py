@@ -11,13 +11,16 @@ from __future__ import annotations
 import io
 import json
 import struct
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.looks.visual import DECOR, visual_of
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
+from ig2mj.scene.scene import Scene
 from ig2mj.sensors.render_model import mean_colours
 
 SEGMENTS = 20
@@ -71,15 +74,34 @@ class _Glb:
         return struct.pack("<4sII", b"glTF", 2, 12 + len(parts)) + parts
 
 
-def scene_glb(model: mujoco.MjModel, owner: np.ndarray) -> bytes:
-    """The file. `owner`: [ngeom] object of each geom, -1 for those of none (`SceneTables.geom_object`)."""
+def decorated_glb(scene: Scene) -> bytes:
+    """`scene_glb` of a scene as its looks show it, but for arms of costumes, which follow no single body."""
+    visual = visual_of(scene)
+    return scene_glb(visual.model, visual.owner, scene.model.nbody, visual.followers.riders)
+
+
+def scene_glb(
+    model: mujoco.MjModel, owner: np.ndarray, bodies: int | None = None, riders: Mapping[int, int] | None = None
+) -> bytes:
+    """The file.
+
+    Args:
+      owner: [ngeom] object of each geom, -1 for those of none (`SceneTables.geom_object`).
+      bodies: that the page knows; None: all. riders: geoms of other bodies that are fixed to one of those; of the rest,
+        decoration stands still, and costumes are left out.
+    """
+    known = model.nbody if bodies is None else bodies
+    of_geoms = {geom: int(body) for geom, body in enumerate(model.geom_bodyid)}
+    of_geoms |= {geom: 0 for geom, body in of_geoms.items() if body >= known and model.body(body).name == DECOR}
+    of_geoms |= riders or {}
     glb = _Glb()
     shapes: dict[tuple, dict[str, int]] = {}
     materials: dict[tuple, int] = {}
     meshes: dict[tuple, int] = {}
-    bodies = [glb.add("nodes", {"name": f"body_{b}"}) for b in range(model.nbody)]
-    glb.json["scenes"][0]["nodes"] = bodies
+    nodes = [glb.add("nodes", {"name": f"body_{b}"}) for b in range(known)]
+    glb.json["scenes"][0]["nodes"] = nodes
     visible = np.flatnonzero(np.isin(model.geom_group, VISIBLE_GROUPS) & (model.geom_rgba[:, 3] > 0))
+    visible = np.array([geom for geom in visible if of_geoms[geom] < known], int)
     colours = mean_colours(model, visible)
     for geom, colour in zip(visible.tolist(), colours, strict=True):
         kind = int(model.geom_type[geom])
@@ -108,7 +130,7 @@ def scene_glb(model: mujoco.MjModel, owner: np.ndarray) -> bytes:
                 "extras": {"object": int(owner[geom]), "geom": geom},
             },
         )
-        glb.json["nodes"][int(model.geom_bodyid[geom])].setdefault("children", []).append(node)
+        glb.json["nodes"][of_geoms[geom]].setdefault("children", []).append(node)
     return glb.bytes()
 
 

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from ig2mj.viewer.state_effects import effects
 from ig2mj.viewer.state_marks import marks, tint_of_objects
 
 if TYPE_CHECKING:
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
 SPHERE, BOX = 0, 1
 """Kinds of marks."""
+
+OPAQUE = 0.5
+"""Opacity of a mark from which it is shown: pages draw all of them opaque, so that steam would hide what steams."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -40,7 +44,10 @@ def looks_of(session: Session) -> Looks:
     world, rules = session.state.batch.world, session.env.core.rules
     assert rules is not None
     rows = []
-    for mark in marks(rules.model, world.states, world.view):
+    tint, time = tint_of_objects(rules.model, world.states), float(np.asarray(world.time)[0])
+    seen = rules.model, world.states, world.view
+    clear = [mark for mark in effects(*seen, time=time, tint=tint) if mark.rgba[3] > OPAQUE]
+    for mark in [*marks(*seen), *clear]:
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, np.ascontiguousarray(mark.axes).ravel())
         kind = BOX if mark.kind == mujoco.mjtGeom.mjGEOM_BOX else SPHERE
@@ -48,8 +55,8 @@ def looks_of(session: Session) -> Looks:
         rows.append([kind, *size, *mark.pos, *quat, *mark.rgba])
     return Looks(
         np.array(rows, np.float32).reshape(-1, 15),
-        tint_of_objects(rules.model, world.states),
+        tint,
         tuple(session.goal()),
         bool(np.asarray(session.state.status.holds)[0]),
-        float(np.asarray(world.time)[0]),
+        time,
     )

@@ -20,7 +20,7 @@ from ig2mj.agents.humanoid.frames import HANDS
 from ig2mj.errors import MissingDependencyError
 from ig2mj.sensors.tints import TINTS
 from ig2mj.vr.frames import Pose
-from ig2mj.vr.glb import scene_glb
+from ig2mj.vr.glb import decorated_glb
 from ig2mj.vr.looks import Looks
 from ig2mj.vr.messages import LARGEST, Rate, decode, pose_message
 from ig2mj.vr.page_source import PagePoses
@@ -56,7 +56,7 @@ class HomePage:
         scene = session.env.scene
         files = {f.relative_to(PAGE).as_posix(): f.read_bytes() for f in PAGE.rglob("*") if f.is_file()}
         files[""] = files["index.html"]
-        files["scene.glb"] = scene_glb(scene.model, np.asarray(scene.tables.geom_object))
+        files["scene.glb"] = decorated_glb(scene)
         self._welcome = json.dumps(_welcome(session))
         self._pages: list[ServerConnection] = []
         self.rates: dict[ServerConnection, Rate] = {}

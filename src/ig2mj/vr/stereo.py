@@ -20,6 +20,8 @@ from jaxtyping import Bool, Float, UInt8
 from scipy.spatial.transform import Rotation
 
 from ig2mj.geometry.frustum import spheres_in_view
+from ig2mj.looks import visual_of
+from ig2mj.looks.visual import FARTHEST
 from ig2mj.process.opengl import images_of, use_opengl
 from ig2mj.scene.geom_groups import HIDDEN_GROUP, VISIBLE_GROUPS
 from ig2mj.scene.scene import Scene
@@ -28,7 +30,7 @@ from ig2mj.vr.frames import Pose
 WIDTH, HEIGHT = 1296, 1440
 """Pixels of each eye (iGibson's VR settings)."""
 
-NEAR, FAR = 0.1, 30.0
+NEAR, FAR = 0.1, FARTHEST
 """m."""
 
 SAMPLES = 4
@@ -77,17 +79,23 @@ class StereoImages:
         from mujoco.rendering.classic import gl_context
 
         self.width, self.height, self._copy = width, height, None
-        self._model = model = copy.copy(scene.model)
+        visual = visual_of(scene)
+        self._model = model = copy.copy(visual.model)
+        self._known, self._followers = scene.model.ngeom, visual.followers
         model.vis.global_.offwidth, model.vis.global_.offheight = 2 * width, height
         model.vis.quality.offsamples = samples
         own = model.geom_bodyid == scene.tables.agent_body[0] if len(scene.tables.agent_body) else False
         model.geom_rgba[own, 3] = 0.0  # nobody sees their own head from inside
         model.geom_matid[own] = -1
-        self._data = scene.start_data()
+        worn = [geom for geom, body in visual.followers.riders.items() if body in scene.tables.agent_body[:1]]
+        model.geom_rgba[worn, 3], model.geom_matid[worn] = 0.0, -1
+        self._data = mujoco.MjData(model)
+        self._data.qpos[:] = scene.start_data().qpos
         mujoco.mj_forward(model, self._data)
         self._geoms = np.flatnonzero(np.isin(model.geom_group, VISIBLE_GROUPS))
         self._groups = model.geom_group[self._geoms]
-        self._turns = Rotation.from_quat(np.roll(model.geom_quat[self._geoms], -1, axis=1))
+        self._posed = self._geoms[self._geoms < self._known]  # the rest stands still, or follows bodies
+        self._turns = Rotation.from_quat(np.roll(model.geom_quat[self._posed], -1, axis=1))
         self.context = gl_context.GLContext(2 * width, height)
         self.context.make_current()
         with images_of(2 * width, height):
@@ -180,11 +188,16 @@ class StereoImages:
 
     def _place(self, poses: Float[np.ndarray, "B 7"]) -> None:
         """Where the geoms are, from where their bodies are."""
-        model, data, geoms = self._model, self._data, self._geoms
+        model, data, geoms = self._model, self._data, self._posed
         bodies = model.geom_bodyid[geoms]
         turns = Rotation.from_quat(np.roll(poses[bodies, 3:], -1, axis=1).astype(np.float64))
         data.geom_xpos[geoms] = poses[bodies, :3] + turns.apply(model.geom_pos[geoms])
         data.geom_xmat[geoms] = (turns * self._turns).as_matrix().reshape(-1, 9)
+        if len(self._followers):
+            axes = Rotation.from_quat(np.roll(poses[:, 3:], -1, axis=1).astype(np.float64)).as_matrix()
+            pos, turned = self._followers.poses(poses[None, :, :3].astype(np.float64), axes[None])
+            data.geom_xpos[self._followers.geoms] = pos[0]
+            data.geom_xmat[self._followers.geoms] = turned[0].reshape(-1, 9)
 
 
 def _aim(camera: mujoco.MjvGLCamera, eye: Eye) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ig2mj.geometry.poses import quat_to_matrix
-from ig2mj.looks.light import Light, shade
+from ig2mj.looks.light import Bulb, Light, shade
 
 PLANE_SIZE = 20.0
 """Metres: what is drawn of a plane without end."""
@@ -49,13 +49,16 @@ def glb_of_geoms(
     frames: dict[int, tuple[np.ndarray, np.ndarray]] | None = None,
     light: Light | None = None,
     turn: Float[np.ndarray, "3 3"] | None = None,
+    place: Float[np.ndarray, "3"] | None = None,
+    bulbs: Sequence[Bulb] = (),
 ) -> bytes:
     """Geoms as one GLB, those of the same material as one mesh.
 
     Args:
       frames: position [3] and quaternion [4] (w-x-y-z) of each geom; None: in the frame of its body.
       light: is computed here, for each corner, so that the page shows the same shade as other renderers; None: the
-        page computes it. turn: from the frame of the vertices to the world, for `light`; None: they are the same.
+        page computes it. turn, place: from the frame of the vertices to the world, for `light`; None: they are the
+        same. bulbs: further light from lamps that are on.
     """
     import trimesh
     from trimesh.visual.texture import TextureVisuals
@@ -81,8 +84,9 @@ def glb_of_geoms(
         material = _material(model, appearance, look)
         mesh.visual = TextureVisuals(uv=uv, material=material)
         if light is not None:
-            normals = np.concatenate([p[1] for p in parts])
-            lit = shade(normals if turn is None else normals @ turn.T, light, appearance[3])
+            turned, origin = np.eye(3) if turn is None else turn, 0.0 if place is None else place
+            vertices, normals = (np.concatenate([p[k] for p in parts]) @ turned.T for k in (0, 1))
+            lit = shade(normals, light, appearance[3], vertices + origin, bulbs)
             mesh.vertex_attributes[_LIT] = linear(lit).astype(np.float32)
         scene.add_geometry(mesh, geom_name=f"m{k}")
     written = scene.export(file_type="glb", include_normals=True, tree_postprocessor=_show_light if light else None)

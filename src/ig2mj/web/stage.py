@@ -8,7 +8,7 @@ Axis: B bodies.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -18,13 +18,14 @@ from jaxtyping import Float
 
 from ig2mj.geometry.poses import quat_to_matrix
 from ig2mj.looks import Visual, visual_of
-from ig2mj.looks.light import Light, linear_lights
+from ig2mj.looks.light import Bulb, Light, linear_lights
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors.render_model import BACKGROUND
 from ig2mj.states.definitions.water import DROP_RADIUS
 from ig2mj.viewer.offscreen import FreeView
 from ig2mj.viewer.overlays import ObjectNames, RoomNames
 from ig2mj.viewer.overview import home_overview
+from ig2mj.viewer.state_marks import Mark
 from ig2mj.web.geometry import PLAIN, Look, glb_of_geoms, visual_geoms
 from ig2mj.web.looks import WATER_COLOUR, Patches
 
@@ -39,6 +40,9 @@ SKY, GROUND, SUN = (255, 255, 255), (170, 165, 160), (255, 250, 240)
 
 SKY_LIGHT, SUN_LIGHT, SUN_FROM = 1.9, 1.0, (3.0, -4.0, 8.0)
 """three.js's intensities, with which a white wall is just not white, and where the sun stands."""
+
+LAMP_END, LAMP_MOVED = 6.0, 0.1
+"""m to which lamps light what moves, and by which a lamp moves before its light on the home is sent again."""
 
 BUILDING = frozenset({"walls", "floors", "ceilings"})
 """Categories that no click is for: they are behind everything."""
@@ -76,6 +80,8 @@ class Stage:
         self._plain: dict[int, bytes] = {}
         self._patches: dict[tuple[str, int], tuple[Patches, Any]] = {}
         self._drops: Any = None
+        self._marks: dict[str, Any] = {}
+        self._bulbs: dict[int, Bulb] = {}
         self._names: list[Any] = []
         self._rooms: list[Any] = []
         self._line: Any = None
@@ -119,9 +125,10 @@ class Stage:
         followers = self._visual.followers
         still = [g for g in geoms if g not in set(followers.geoms.tolist())]
         shown: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
+        self._still, self._decoration = still, None
         if still:
             content = glb_of_geoms(self._model, still, light=self._visual.light)
-            self._server.scene.add_glb("/decoration", content, **shown)
+            self._decoration = self._server.scene.add_glb("/decoration", content, **shown)
         for g in followers.geoms.tolist():
             content = glb_of_geoms(self._model, [g], frames={g: (np.zeros(3), np.array([1.0, 0, 0, 0]))})
             self._costumes.append(self._server.scene.add_glb(f"/costume{g}", content, **shown))
@@ -143,7 +150,8 @@ class Stage:
         turns = self._scene.model.body_weldid[body] != 0
         turn = np.asarray(quat_to_matrix(self._quat[body]))
         light = None if turns else self._visual.light
-        return glb_of_geoms(self._model, self._geoms[body], look, light=light, turn=turn)
+        bulbs, place = list(self._bulbs.values()), self._pos[body]
+        return glb_of_geoms(self._model, self._geoms[body], look, light=light, turn=turn, place=place, bulbs=bulbs)
 
     def _view(self, data: mujoco.MjData) -> None:
         """Where pages look from at first: the whole home, or a robot in it, over its shoulder."""
@@ -220,6 +228,78 @@ class Stage:
             if look != self._looks.get(body, PLAIN):
                 self._looks[body] = look
                 self._draw(body, look)
+
+    def switch(self, on: Collection[int]) -> None:
+        """Lets lamps light the home: of these objects, and no others. What stands still is sent again."""
+        if self._visual.light is None:
+            return
+        bulbs = {}
+        for light in self._visual.lamps:
+            body = int(self._model.light_bodyid[light])
+            if self._object_of[body] in on:
+                bulbs[light] = self._bulb(light, body)
+        if self._bulbs.keys() == bulbs.keys() and all(_near(self._bulbs[k].pos, bulbs[k].pos) for k in bulbs):
+            return
+        for light in self._bulbs.keys() | bulbs.keys():
+            self._server.scene.remove_by_name(f"/light/lamp{light}")
+        self._bulbs = bulbs
+        for light, bulb in bulbs.items():
+            power = max(bulb.rgb)
+            lamp: dict[str, Any] = {
+                "color": _rgb(_unit(bulb.rgb)),
+                "intensity": 0.5 * power * np.pi,
+                "distance": LAMP_END,
+            }
+            self._server.scene.add_light_point(f"/light/lamp{light}", **lamp, position=bulb.pos)
+        still = [body for body in self._geoms if self._scene.model.body_weldid[body] == 0]
+        with self._server.atomic():
+            for body in still:
+                self._plain[body] = self._glb(body)
+                self._draw(body, self._looks.get(body, PLAIN))
+            if self._decoration is not None:
+                light = self._visual.light
+                self._decoration.glb_data = glb_of_geoms(
+                    self._model, self._still, light=light, bulbs=list(bulbs.values())
+                )
+
+    def _bulb(self, light: int, body: int) -> Bulb:
+        turn = np.asarray(quat_to_matrix(self._quat[body]))
+        pos = self._pos[body] + turn @ self._model.light_pos[light]
+        rgb, reach = self._model.light_diffuse[light], self._model.light_attenuation[light]
+        return Bulb(tuple(pos.tolist()), tuple(rgb.tolist()), tuple(reach.tolist()))
+
+    def mark(self, marks: Sequence[Mark]) -> None:
+        """Shows steam, smoke, frost, drops and glow, world frame; what is not named is gone."""
+        for name, kind in (("blocks", True), ("balls", False)):
+            here = [m for m in marks if (m.kind == mujoco.mjtGeom.mjGEOM_BOX) == kind]
+            node = self._marks.get(name)
+            if node is not None and len(node.batched_positions) != len(here):
+                self._marks.pop(name).remove()
+                node = None
+            if not here:
+                continue
+            pos = np.array([m.pos for m in here], np.float32)
+            scale = np.array([(*m.size, *m.size[-1:] * (3 - len(m.size))) for m in here], np.float32)
+            rgba = np.array([m.rgba for m in here], np.float32)
+            if node is not None:
+                with self._server.atomic():
+                    node.batched_positions, node.batched_scales, node.batched_opacities = pos, scale, rgba[:, 3]
+                continue
+            vertices, faces = _block() if kind else _ball()
+            self._marks[name] = self._server.scene.add_batched_meshes_simple(
+                f"/effects/{name}",
+                vertices,
+                faces,
+                batched_positions=pos,
+                batched_wxyzs=np.array([_quat(m.axes) for m in here], np.float32),
+                batched_scales=scale,
+                batched_colors=np.round(255 * rgba[:, :3]).astype(np.uint8),
+                batched_opacities=rgba[:, 3],
+                lod="off",
+                flat_shading=kind,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
 
     def dirty(self, patches: Mapping[tuple[str, int], Patches]) -> None:
         """Shows dust and stains; what is not named is clean."""
@@ -320,6 +400,23 @@ def _drawn(scene: Scene, visual: Visual) -> list[int]:
 def _rgb(colour: tuple[float, float, float]) -> tuple[int, int, int]:
     r, g, b = (round(255 * c) for c in colour)
     return r, g, b
+
+
+def _unit(rgb: tuple[float, ...]) -> tuple[float, float, float]:
+    """The colour at its brightest."""
+    r, g, b = (c / max(*rgb, 1e-6) for c in rgb)
+    return r, g, b
+
+
+def _near(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    """Whether light from both places looks the same."""
+    return float(np.abs(np.subtract(a, b)).max()) < LAMP_MOVED
+
+
+def _quat(axes: Float[np.ndarray, "3 3"]) -> np.ndarray:
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, np.ascontiguousarray(axes, float).ravel())
+    return quat
 
 
 def _ball() -> tuple[np.ndarray, np.ndarray]:

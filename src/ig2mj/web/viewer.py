@@ -16,7 +16,11 @@ import time
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int
 
+from ig2mj.sensors.tints import SWITCHED_ON
+from ig2mj.viewer.state_effects import effects
+from ig2mj.viewer.state_marks import Mark, tint_of_objects
 from ig2mj.web.access import Access
 from ig2mj.web.controls import Controls
 from ig2mj.web.looks import drops_of, looks_of, patches_of
@@ -52,6 +56,8 @@ class WebViewer:
         self.controls = Controls(self._server, self.runner, title or source.scene.name)
         self.frames = 0
         self._last: Shot | None = None
+        self._tint: Int[np.ndarray, "O"] | None = None
+        self._effects = False
         self._moved = 0
         self._rows_shown: tuple[int, int] = (0, 0)
         self._stopped = threading.Event()
@@ -145,6 +151,8 @@ class WebViewer:
         self.frames += 1
         self._last = shot
         self.stage.rain(drops_of(shot.states, shot.row))
+        if self._effects:
+            self._show_effects(shot)
         self._springs(shot)
 
     def _springs(self, shot: Shot) -> None:
@@ -154,11 +162,23 @@ class WebViewer:
             ends.append([at, drag.target])
         self.stage.spring(np.array(ends, float).reshape(-1, 2, 3))
 
+    def _show_effects(self, shot: Shot) -> None:
+        """Steam, smoke, frost, drops and glow, with the tints of the last look."""
+        found = list[Mark]()
+        if self.controls.colours == "states" and self._tint is not None:
+            world = self.runner.source.model, shot.states, shot.view, shot.row
+            found = effects(*world, time=shot.time, tint=self._tint)
+        self.stage.mark(found)
+        self._effects = bool(found)
+
     def _look(self, shot: Shot) -> None:
         """What changes seldom: texts, colours, particles."""
         model = self.runner.source.model
         self.stage.colour(looks_of(model, shot.states, shot.row, self.controls.colours))
         self.stage.dirty(patches_of(model, shot.states, shot.row))
+        self._tint = tint_of_objects(model, shot.states, shot.row)
+        self._show_effects(shot)
+        self.stage.switch(set(np.flatnonzero(self._tint == SWITCHED_ON).tolist()))
         self.stage.write_names(self.controls.names_shown)
         self.stage.write_rooms(self.controls.rooms_shown)
         self.controls.write(shot, self._moved)
