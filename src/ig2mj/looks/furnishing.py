@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from ig2mj.looks import drawings, mesh, ornaments, shelves
+from ig2mj.looks.corner_things import IN_CORNERS
 from ig2mj.looks.home_plan import Face, HomePlan, Room, Solid, seed_of, spans
 from ig2mj.looks.light import Light
 from ig2mj.looks.materials import Material
@@ -65,7 +66,7 @@ PICTURES = {
 SHELVES = {
     "living_room": 1,
     "bedroom": 1,
-    "library": 4,
+    "library": 12,
     "home_office": 2,
     "childs_room": 2,
     "playroom": 2,
@@ -137,14 +138,8 @@ class _Furnisher:
                 0.1,
                 lambda p, f: ornaments.utensil_rail(self.build, p.at(0, 0, 0.16), min(1.1, f), self.stock),
             )
-        if kind in ("closet",):
-            self._on_wall(
-                0.8,
-                0.5,
-                1.72,
-                0.3,
-                lambda p, f: ornaments.clothes_rail(self.build, p.at(0, 0, 0.55), min(1.4, f), self.stock),
-            )
+        if kind == "closet":
+            self._clothes()
         if kind in ("childs_room", "playroom"):
             self._on_wall(
                 1.2,
@@ -169,7 +164,7 @@ class _Furnisher:
         if kind in ("corridor", "lobby", "staircase"):
             self._on_wall(0.25, 1.6, 1.9, 0.2, lambda p, f: ornaments.sconce(self.build, p, self.stock), 2)
         self._rug()
-        self._plants()
+        self._corners()
 
     def _free(self, bottom: float | int, top: float | int, depth: float | int) -> list[Face]:
         return spans(self.plan, self.room.name, bottom, top, depth, 0.05, self.taken)
@@ -256,21 +251,36 @@ class _Furnisher:
 
         self._on_wall(0.75, 0.02, 1.86, 0.16, make)
 
+    def _clothes(self) -> None:
+        """Rails with coats, or with shirts above what stands at the wall."""
+        for bottom, shortest, longest in ((0.6, 0.55, 0.9), (1.15, 0.4, 0.5)):
+
+            def make(place: Place, length: float | int, bottom=bottom, sizes=(shortest, longest)) -> None:
+                rail = place.at(0, 0, (1.75 - bottom) / 2 - 0.05)
+                ornaments.clothes_rail(self.build, rail, min(1.4, length), self.stock, sizes)
+
+            if self._on_wall(0.6, bottom, 1.75, 0.3, make):
+                return
+
     def _shelves(self) -> None:
         count, kind = SHELVES.get(self.room.kind, 0), self.room.kind
-        rows = {"library": 2, "pantry_room": 2, "storage_room": 2, "home_office": 2}.get(kind, 1)
+        rows = {"library": 4, "pantry_room": 3, "storage_room": 2, "home_office": 2}.get(kind, 1)
+        bottom = {3: 1.02, 4: 0.72}.get(rows, 1.38)
 
         def make(place: Place, length: float | int) -> None:
             for row in range(rows):
                 shelves.wall_shelf(
                     self.build,
-                    place.at(0, 0, 0.37 * row - 0.28 + 0.1 * (rows == 1)),
+                    place.at(0, 0, bottom + 0.09 + 0.37 * row + 0.1 * (rows == 1) - (bottom + 2.12) / 2),
                     min(1.3, length - 0.1),
                     kind,
                     self.stock,
                 )
 
-        self._on_wall(0.6, 1.38, 2.12, 0.22, make, -(-count // rows))
+        made = self._on_wall(0.6, bottom, 2.12, 0.22, make, -(-count // rows))
+        if rows > 2 and made * rows < count:  # above what stands at the walls
+            rows, bottom = 2, 1.38
+            self._on_wall(0.6, bottom, 2.12, 0.22, make, -(-(count - 4 * made) // rows))
 
     def _pictures(self) -> None:
         rng, stock = self.stock.rng, self.stock
@@ -318,9 +328,22 @@ class _Furnisher:
             corners = [*corners[1:], corners[0]]
         self.build.add(material, mesh.quad([(*c, 0.008) for c in corners]))
 
-    def _plants(self) -> None:
-        """In corners of walls where nothing stands."""
-        count, rng = PLANTS.get(self.room.kind, 0), self.stock.rng
+    def _corners(self) -> None:
+        """What stands in corners of walls where nothing else does, and plants in those that are left."""
+        rng, kind, middle = self.stock.rng, self.room.kind, self.room.middle
+        free = self._free_corners()
+        spots = [free[k] for k in rng.permutation(len(free)).tolist()]
+        for thing in IN_CORNERS.get(kind, ()):
+            if spots:
+                spot = spots.pop()
+                away = middle - spot
+                turn = math.atan2(-away[0], away[1])  # its front (y) looks into the room
+                thing(self.build, Place(np.array([*spot, 0.0]), turn), self.stock)
+        for spot in spots[: PLANTS.get(kind, 0)]:
+            height = float(rng.uniform(0.8, 1.0)) * PLANT_HEIGHT
+            ornaments.plant(self.build, Place(np.array([*spot, 0.0])), height, self.stock)
+
+    def _free_corners(self) -> list[np.ndarray]:
         spots = []
         for a in self.plan.of_room(self.room.name):
             for b in self.plan.of_room(self.room.name):
@@ -347,9 +370,7 @@ class _Furnisher:
             doors = any(np.linalg.norm(d.solid.middle[:2] - spot) < 0.75 for d in self.plan.doors)
             if not blocked and not doors:
                 free.append(spot)
-        for k in rng.permutation(len(free))[:count].tolist():
-            height = float(rng.uniform(0.8, 1.0)) * PLANT_HEIGHT
-            ornaments.plant(self.build, Place(np.array([*free[k], 0.0])), height, self.stock)
+        return free
 
     def _balcony(self) -> None:
         """Boxes with flowers on the parapet."""

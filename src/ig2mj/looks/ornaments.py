@@ -183,15 +183,17 @@ def utensil_rail(build: Builder, place: Place, width: float | int, stock: Stock)
         k += 1
 
 
-def clothes_rail(build: Builder, place: Place, width: float | int, stock: Stock) -> None:
-    """A rail on the wall with clothes on it."""
+def clothes_rail(
+    build: Builder, place: Place, width: float | int, stock: Stock, lengths: tuple[float, float] = (0.55, 0.9)
+) -> None:
+    """A rail on the wall with clothes on it, which hang down by `lengths` m, from and to."""
     build.paint(STEEL, *place.put(mesh.rod((-width / 2, 0.16, 0), (width / 2, 0.16, 0), 0.012)))
     for x in (-width / 2 + 0.03, width / 2 - 0.03):
         build.paint(STEEL, *place.put(mesh.rod((x, 0, 0), (x, 0.16, 0), 0.01)))
     x = -width / 2 + 0.12
     while x < width / 2 - 0.1:
         spot = Place(place.at(x, 0.16, -0.02).pos, place.turn + math.pi / 2)
-        coat(build, spot, stock, float(stock.rng.uniform(0.55, 0.9)))
+        coat(build, spot, stock, float(stock.rng.uniform(*lengths)))
         x += float(stock.rng.uniform(0.1, 0.16))
 
 
