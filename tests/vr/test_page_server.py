@@ -16,10 +16,11 @@ from websockets.sync.client import connect
 import ig2mj
 from ig2mj.agents import Humanoid
 from ig2mj.errors import MissingDependencyError
+from ig2mj.looks import visual_of
 from ig2mj.sensors.tints import TINTS
 from ig2mj.vr import server
 from ig2mj.vr.frames import PoseFrame
-from ig2mj.vr.glb import scene_glb
+from ig2mj.vr.glb import decorated_glb, scene_glb
 from ig2mj.vr.looks import Looks
 from ig2mj.vr.mapping import Memory
 from ig2mj.vr.page_source import PagePoses
@@ -91,6 +92,15 @@ def test_geometry_has_a_node_for_each_body_and_all_that_can_be_seen(scene):
         half = scene.model.geom_aabb[geom, 3:]
         assert (high - low) / 2 == pytest.approx(half, abs=0.02 * half.max()), geom
         assert (high + low) / 2 == pytest.approx(scene.model.geom_aabb[geom, :3], abs=0.02 * half.max())
+
+
+def test_pages_show_what_looks_add_on_bodies_that_they_know(scene):
+    found, visual = nodes_of(decorated_glb(scene)), visual_of(scene)
+    assert len(found["scenes"][0]["nodes"]) == scene.model.nbody
+    drawn = {node["extras"]["geom"] for node in found["nodes"] if "mesh" in node}
+    worn = set(visual.followers.riders)
+    assert worn and worn <= drawn and len(worn) < len(visual.followers)
+    assert not drawn & (set(visual.followers.geoms.tolist()) - worn), "arms follow two bodies"
 
 
 def test_a_page_is_welcomed_gets_all_poses_once_and_drives(page, session):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import http.client
 import random
 import time
@@ -16,6 +17,8 @@ from web_page import Page
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from ig2mj.engine.registry import make_engine
+from ig2mj.viewer.state_effects import effects
+from ig2mj.viewer.state_marks import tint_of_objects
 from ig2mj.web.access import access_for
 from ig2mj.web.sources import Home
 from ig2mj.web.viewer import WebViewer
@@ -89,6 +92,19 @@ def test_a_click_lists_the_states_of_the_object(viewer, page):
     page.send("SceneNodeClickMessage", name=f"/b{body}", instance_index=None, modifier=None, **ray)
     assert page.receive(lambda: "<b>apple</b>" in page.texts())
     assert "temperature" in page.texts() and "cooked" in page.texts()
+
+
+def test_steam_is_shown_while_something_is_hot(viewer, page):
+    model, states = viewer.runner.source.model, viewer._last.states
+    hot = np.array(states.temperature)
+    hot[:, viewer.runner.source.scene.object_index("apple")] = 68.0
+    shot = dataclasses.replace(viewer._last, states=states.replace(temperature=hot))
+    viewer._tint = tint_of_objects(model, shot.states, shot.row)
+    found = effects(model, shot.states, shot.view, shot.row, tint=viewer._tint)
+    viewer.stage.mark(found)
+    assert page.receive(lambda: "/effects/balls" in page.nodes) and len(found) > 5
+    viewer.stage.mark([])
+    assert page.receive(lambda: "/effects/balls" not in page.nodes)
 
 
 def test_an_object_is_dragged_by_a_spring_and_only_what_moves_is_sent(viewer, page):
