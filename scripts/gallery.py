@@ -129,8 +129,34 @@ def states() -> None:
         view = FreeView((float(at[0]), float(at[1]), float(pos[2]) + 0.03), 0.62, 60.0, -28.0)
         tiles.append(caption(sim.render(view, width=600, height=450), title))
         del sim
+    for looks, name, title, distance, elevation in (
+        ("night", "floor_lamp_0", "lamp by night", 2.2, -8.0),
+        ("day", "sink_0", "sink", 1.1, -38.0),
+    ):
+        sim = ig2mj.Simulation(load_scene("birch", looks=looks))
+        index = sim.scene.object_index(name)
+        low, high = (np.asarray(getattr(sim.view, side))[0, index] for side in ("aabb_low", "aabb_high"))
+        at, turn = (low + high) / 2, np.degrees(np.arctan2(*into_room(sim, index)[::-1])) + 180.0
+        view = FreeView((float(at[0]), float(at[1]), float(high[2]) - 0.25), distance, turn + 20.0, elevation)
+        for on in (False, True):
+            sim.set_predicate("toggled_on", name, value=on)
+            sim.step(count=30)
+            words = title + ", on" * on
+            tiles.append(caption(sim.render(view, width=600, height=450), words))
+        del sim
     small = [Image.fromarray(t).resize((300, 225), Image.Resampling.LANCZOS) for t in tiles]
     sheet([np.asarray(image) for image in small], 4).save(FOLDER / "gallery_states.jpg", quality=QUALITY)
+
+
+def into_room(sim: ig2mj.Simulation, index: int) -> np.ndarray:
+    """Direction [2] from an object to the middle of its room."""
+    rooms = sim.scene.rooms
+    assert rooms is not None
+    pos = np.asarray(sim.view.object_com)[0, index][:2]
+    mask = rooms.room_map == rooms.index_at(pos[None])[0] + 1
+    rows, columns = np.nonzero(mask)
+    middle = (np.array([columns.mean(), rows.mean()]) - mask.shape[0] / 2) * rooms.resolution
+    return middle - pos
 
 
 def tile(scene: Scene, view: FreeView, words: str, size: tuple[int, int] = TILE) -> Image.Image:

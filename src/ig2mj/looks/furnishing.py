@@ -99,6 +99,9 @@ PLANTS = {
 PLANT_HEIGHT, PLANT_RADIUS = 1.05, 0.17
 """m."""
 
+BESIDE_WALL, FROM_DOORS = 0.23, 0.95
+"""m from a wall, and from the middle of a door, to the middle of what stands next to the wall."""
+
 
 def add_furnishing(build: Builder, plan: HomePlan, light: Light) -> None:
     """Adds what each room is decorated with."""
@@ -259,8 +262,7 @@ class _Furnisher:
                 rail = place.at(0, 0, (1.75 - bottom) / 2 - 0.05)
                 ornaments.clothes_rail(self.build, rail, min(1.4, length), self.stock, sizes)
 
-            if self._on_wall(0.6, bottom, 1.75, 0.3, make):
-                return
+            self._on_wall(0.6, bottom, 1.75, 0.3, make, 2)
 
     def _shelves(self) -> None:
         count, kind = SHELVES.get(self.room.kind, 0), self.room.kind
@@ -334,14 +336,27 @@ class _Furnisher:
         free = self._free_corners()
         spots = [free[k] for k in rng.permutation(len(free)).tolist()]
         for thing in IN_CORNERS.get(kind, ()):
-            if spots:
-                spot = spots.pop()
+            at_wall = [] if spots else self._ends_of_walls()
+            if spots or at_wall:
+                spot = spots.pop() if spots else pick(rng, at_wall)
                 away = middle - spot
                 turn = math.atan2(-away[0], away[1])  # its front (y) looks into the room
                 thing(self.build, Place(np.array([*spot, 0.0]), turn), self.stock)
+                low, high = spot - BESIDE_WALL, spot + BESIDE_WALL
+                self.taken.append(Solid(np.array([*low, 0.0]), np.array([*high, PLANT_HEIGHT]), "decoration"))
         for spot in spots[: PLANTS.get(kind, 0)]:
             height = float(rng.uniform(0.8, 1.0)) * PLANT_HEIGHT
             ornaments.plant(self.build, Place(np.array([*spot, 0.0])), height, self.stock)
+
+    def _ends_of_walls(self) -> list[np.ndarray]:
+        """Where something may stand next to a wall: at the ends of free stretches, away from doors."""
+        found = []
+        for face in self._free(0.02, 0.95, 2 * BESIDE_WALL):
+            if face.high - face.low > 2 * BESIDE_WALL + 0.1:
+                for along in (face.low + BESIDE_WALL, face.high - BESIDE_WALL):
+                    found.append(face.point(along, BESIDE_WALL, 0.0)[:2])
+        doors = [door.solid.middle[:2] for door in self.plan.doors]
+        return [spot for spot in found if all(np.linalg.norm(door - spot) > FROM_DOORS for door in doors)]
 
     def _free_corners(self) -> list[np.ndarray]:
         spots = []

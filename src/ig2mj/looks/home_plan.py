@@ -30,8 +30,8 @@ OFF_GRID = 0.000237
 """m added before coordinates are compared by millimetres: those of plans are multiples of half of one."""
 
 
-Rectangle = tuple[np.ndarray, np.ndarray, int, int]
-"""Low and high corner [3], axis of its normal, and the normal's sign."""
+Rectangle = tuple[np.ndarray, np.ndarray, int, int, int, tuple[int, int]]
+"""Low and high corner [3], axis of its normal, the normal's sign, its geom, and two triangles of that geom's mesh."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -154,7 +154,7 @@ def read_plan(scene: Scene) -> HomePlan | None:
     faces.sort(key=lambda f: (f.room or "", f.axis, f.sign, f.at, f.low, f.bottom))
     height = float(np.median([f.top for f in faces if f.room] or [max(f.top for f in faces)]))
     floors = []
-    for low, high, _, _ in _rectangles(scene, data, "floors", upright=False):
+    for low, high, *_ in _rectangles(scene, data, "floors", upright=False):
         floors.append((low[:2], high[:2], float(high[2]), rooms.room_at((low + high)[:2] / 2)))
     found = tuple(_room(scene, rooms, name, kind) for name, kind in zip(rooms.names, rooms.types, strict=True))
     solids = tuple(_solids(scene, data))
@@ -172,6 +172,21 @@ def read_plan(scene: Scene) -> HomePlan | None:
         low=corners.min(0),
         high=corners.max(0),
     )
+
+
+def covered_triangles(scene: Scene) -> dict[int, np.ndarray]:
+    """Geoms of walls and floors, and which of their triangles [F] lie behind what decoration puts on them."""
+    rooms = scene.rooms
+    if read_plan(scene) is None or rooms is None:
+        return {}
+    data, covered = scene.start_data(), dict[int, np.ndarray]()
+    for upright in (True, False):
+        for low, high, _, _, geom, triangles in _rectangles(scene, data, "walls" if upright else "floors", upright):
+            if not upright and rooms.room_at((low + high)[:2] / 2) is None:
+                continue
+            count = int(scene.model.mesh_facenum[scene.model.geom_dataid[geom]])
+            covered.setdefault(geom, np.zeros(count, bool))[list(triangles)] = True
+    return covered
 
 
 def seed_of(*names: str) -> int:
@@ -197,23 +212,24 @@ def _rectangles(scene: Scene, data: mujoco.MjData, category: str, upright: bool)
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         pairs: dict[tuple, list] = collections.defaultdict(list)
-        for triangle, n in zip(corners, normal, strict=True):
+        for number, (triangle, n) in enumerate(zip(corners, normal, strict=True)):
             axis = int(np.argmax(np.abs(n)))
             if abs(n[axis]) < 0.999 or (axis == 2) == upright or (not upright and n[2] < 0):
                 continue
             low, high = triangle.min(0), triangle.max(0)
             cells = np.floor((np.array([*low, *high]) + OFF_GRID) * 1000)
-            pairs[axis, n[axis] > 0, tuple(cells)].append((low, high))
+            pairs[axis, n[axis] > 0, tuple(cells)].append((low, high, number))
         for (axis, positive, _), members in pairs.items():
             if len(members) == 2:
-                low, high = members[0]
-                found.append((low, high, axis, 1 if positive else -1))
+                low, high, _ = members[0]
+                triangles = members[0][2], members[1][2]
+                found.append((low, high, axis, 1 if positive else -1, int(geom), triangles))
     return found
 
 
 def _by_room(rectangle: Rectangle, rooms: Rooms) -> list[Face]:
     """The rectangle in pieces, each before one room."""
-    low, high, axis, sign = rectangle
+    low, high, axis, sign, _, _ = rectangle
     other = 1 - axis
     start, end = float(low[other]), float(high[other])
     if end - start < REVEAL:

@@ -40,12 +40,12 @@ def add_interior(build: Builder, plan: HomePlan, light: Light) -> None:
     for room in plan.rooms:
         style = STYLES.get(room.kind, STYLES["kitchen"])
         walls = Material(f"wall_{room.name}", wall_texture(style, plan.height, room.seed), specular=0.03, shininess=0.1)
-        build.add(walls, *(_wall(face, plan.height) for face in plan.of_room(room.name)))
+        build.add(walls, *(_wall(face, plan.height, build.fine) for face in plan.of_room(room.name)))
         if room.kind not in BARE:
             _skirting(build, plan, room)
     facade = Material("wall_outside", wall_texture(FACADE, plan.height, seed_of(plan.name)), rgba=(*light.outside, 1.0))
-    build.add(facade, *(_wall(face, plan.height) for face in plan.of_room(None)))
-    build.paint(TRIM, *(_wall(face, plan.height) for face in plan.of_room("")))
+    build.add(facade, *(_wall(face, plan.height, build.fine) for face in plan.of_room(None)))
+    build.paint(TRIM, *(_wall(face, plan.height, build.fine) for face in plan.of_room("")))
     _floors(build, plan, light)
     _ceilings(build, plan)
     for room in (r for r in plan.rooms if r.kind == "kitchen"):
@@ -56,7 +56,7 @@ def add_interior(build: Builder, plan: HomePlan, light: Light) -> None:
         _sockets(build, plan, room)
 
 
-def _wall(face: Face, height: float | int) -> Triangles:
+def _wall(face: Face, height: float | int, fine: bool) -> Triangles:
     """The face, a little before itself; its texture goes from the floor to the ceiling."""
     up = np.array([0, 0, face.top - face.bottom])
     start, end = face.point(face.low, SKIN, face.bottom), face.point(face.high, SKIN, face.bottom)
@@ -66,7 +66,7 @@ def _wall(face: Face, height: float | int) -> Triangles:
     if b < a:
         a, b = -a, -b
     uv = (a / WALL_WIDTH, max(face.bottom, 0.0) / height, b / WALL_WIDTH, min(face.top / height, 1.0))
-    return mesh.sheet(start, end - start, up, uv, PIECE)
+    return mesh.sheet(start, end - start, up, uv, PIECE * fine)
 
 
 def _skirting(build: Builder, plan: HomePlan, room: Room) -> None:
@@ -118,7 +118,7 @@ def _floors(build: Builder, plan: HomePlan, light: Light) -> None:
         material = Material(f"floor_{name}", image, specular=0.12, shininess=0.4)
         uv0, uv1 = ((c - inner_low) / (inner_high - inner_low) for c in (low, high))
         edges = np.array([high[0] - low[0], 0, 0]), np.array([0, high[1] - low[1], 0])
-        build.add(material, mesh.sheet((*low, z + FLOOR_SKIN), *edges, (*uv0, *uv1), PIECE))
+        build.add(material, mesh.sheet((*low, z + FLOOR_SKIN), *edges, (*uv0, *uv1), PIECE * build.fine))
 
 
 def _sunlight(window: Opening) -> np.ndarray | None:
@@ -143,10 +143,10 @@ def _ceilings(build: Builder, plan: HomePlan) -> None:
     for low, high, _, name in plan.floors:
         if name is None or plan.room(name).kind == "balcony":
             continue
-        size = high - low
+        size, step = high - low, PIECE * build.fine
         build.add(
             material,
-            mesh.sheet((low[0], high[1], plan.height - 0.001), (size[0], 0, 0), (0, -size[1], 0), (0, 0, 1, 1), PIECE),
+            mesh.sheet((low[0], high[1], plan.height - 0.001), (size[0], 0, 0), (0, -size[1], 0), (0, 0, 1, 1), step),
         )
 
 
@@ -170,7 +170,7 @@ def _splashback(build: Builder, plan: HomePlan, room: Room) -> None:
         high = min(face.high, max(float(s.high[k]) for s in near))
         if high - low > 0.3:
             piece = Face(face.room, face.axis, face.sign, face.at, low, high, 0.85, 1.5)
-            tiled = _wall(piece, 0.6)
+            tiled = _wall(piece, 0.6, build.fine)
             uv = np.stack([tiled.uv[:, 0] * WALL_WIDTH / 0.6, (tiled.vertices[:, 2] - 0.85) / 0.6], 1)
             out = np.zeros(3)
             out[face.axis] = face.sign * 0.004

@@ -166,17 +166,44 @@ def rod(start: Vector, end: Vector, radius: float | int, sides: int = 8) -> Tria
     return dataclasses.replace(made, vertices=made.vertices + start)
 
 
-class Builder:
-    """What a home is decorated with. `add` takes triangles of a material, `paint` those of a plain colour."""
+SMALL, BLURRED = 0.05, 0.15
+"""m: extent below which a part is left out of what is not fine, and is a box: 2 and 5 pixels of a robot's camera, from
+2 m."""
 
-    def __init__(self):
+
+def _boxed(part: Triangles) -> Triangles:
+    """The box around it, if that has fewer triangles."""
+    low, high = part.vertices.min(0), part.vertices.max(0)
+    if len(part.faces) <= 12 or (high - low).min() < 1e-3:
+        return part
+    around = box((low + high) / 2, high - low)
+    return dataclasses.replace(around, uv=np.tile(part.uv.mean(0), (len(around.vertices), 1)))
+
+
+def _one_sided(part: Triangles) -> Triangles:
+    """Without triangles that are the back of another one."""
+    _, number = np.unique(np.round(part.vertices, 4), axis=0, return_inverse=True)
+    _, first = np.unique(np.sort(number.reshape(-1)[part.faces], axis=1), axis=0, return_index=True)
+    return dataclasses.replace(part, faces=part.faces[np.sort(first)])
+
+
+class Builder:
+    """What a home is decorated with. `add` takes triangles of a material, `paint` those of a plain colour.
+
+    Attributes:
+      fine: with parts that are `SMALL`, both sides of what is thin, and walls in pieces; else for small images, of
+        renderers that compute light for each pixel and show both sides of a triangle.
+    """
+
+    def __init__(self, fine: bool = True):
+        self.fine = fine
         self.parts: dict[Material, list[Triangles]] = {}
         self._colours: dict[Colour, int] = {}
         self._painted: list[Triangles] = []
 
     def add(self, material: Material, *parts: Triangles) -> None:
         """Adds triangles that show a material."""
-        self.parts.setdefault(material, []).extend(parts)
+        self.parts.setdefault(material, []).extend(self._shown(parts))
 
     def paint(self, colour: Colour, *parts: Triangles) -> None:
         """Adds triangles of a plain colour (rgb, 0..1)."""
@@ -188,7 +215,13 @@ class Builder:
                 key=lambda k: sum((a - b) ** 2 for a, b in zip(list(self._colours)[k], key, strict=True)),
             )
         at = (np.array([number % CELLS, number // CELLS]) + 0.5) / CELLS
-        self._painted += [dataclasses.replace(p, uv=np.tile(at, (len(p.vertices), 1))) for p in parts]
+        self._painted += [dataclasses.replace(p, uv=np.tile(at, (len(p.vertices), 1))) for p in self._shown(parts)]
+
+    def _shown(self, parts: Iterable[Triangles]) -> list[Triangles]:
+        if self.fine:
+            return list(parts)
+        seen = ((p, float(np.ptp(p.vertices, axis=0).max())) for p in parts)
+        return [_boxed(p) if size < BLURRED else _one_sided(p) for p, size in seen if size >= SMALL]
 
     def meshes(self) -> list[tuple[Material, Triangles]]:
         """One mesh for each material."""

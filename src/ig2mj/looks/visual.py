@@ -120,8 +120,12 @@ def visual_of(scene: Scene, looks: str | None = None) -> Visual:
     return of_scene[looks]
 
 
-def decorate(spec: mujoco.MjSpec, scene: Scene, looks: str) -> None:
-    """Adds the decoration of a home to its spec, which is not compiled yet, behind all that it has."""
+def decorate(spec: mujoco.MjSpec, scene: Scene, looks: str, fine: bool = True) -> None:
+    """Adds the decoration of a home to its spec, which is not compiled yet, behind all that it has.
+
+    Args:
+      fine: see `mesh.Builder`.
+    """
     if looks == PLAIN:
         return
     light = LIGHTS[looks]
@@ -129,7 +133,7 @@ def decorate(spec: mujoco.MjSpec, scene: Scene, looks: str) -> None:
     _dress(spec, scene)
     add_tinted_materials(spec, scene)
     add_lamps(spec, scene)
-    build, plan = Builder(), read_plan(scene)
+    build, plan = Builder(fine), read_plan(scene)
     if plan is None:
         return
     add_interior(build, plan, light)

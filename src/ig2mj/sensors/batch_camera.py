@@ -30,6 +30,7 @@ from ig2mj.engine.warp.patches import graphs_kept, pins
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.looks.costume import Followers
+from ig2mj.looks.home_plan import covered_triangles
 from ig2mj.looks.state_looks import OF_MATERIAL, lamp_geoms, tinted_materials
 from ig2mj.looks.visual import visual_owners
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
@@ -123,6 +124,7 @@ class BatchCamera:
         self.cameras = [_camera_id(host, name) for name in cameras]
         if rgb and cameras:
             fit_textures(host, float(2 * np.tan(np.deg2rad(host.cam_fovy[self.cameras].min()) / 2) / height))
+        self._covered = {} if looks == PLAIN else covered_triangles(engine.scene)
         self._plan(host)
         self._model = mjx.put_model(host, own_device(), impl="warp")
         if self._lit:  # the last light only carries the colour of the one at the camera
@@ -192,7 +194,7 @@ class BatchCamera:
         """Hides the geoms that merged meshes show, and those that nobody sees, from the ray caster's boxes; None where
         the scene shows no meshes."""
         host = self._host
-        parts = rigid_parts(host, self.engine.scene.model, groups)
+        parts = rigid_parts(host, self.engine.scene.model, groups, self._covered)
         if not parts:
             return None
         tables = tables_of(host, parts)
@@ -314,7 +316,6 @@ class BatchCamera:
         self._rgba, self._mean = _f32(host.geom_rgba), mean_colours(host, np.arange(host.ngeom))
         self._material = np.array(host.geom_matid, np.int32)
         self._in_tint, self._lamps = tinted_materials(host, STATES), lamp_geoms(host)
-        self._active = np.array(host.light_active, bool)
         self._size = np.array(host.geom_size, np.float32)
         self._camera_in_body = (host.cam_bodyid, _f32(host.cam_pos), _f32(host.cam_quat))
         self._light_in_body = (host.light_bodyid, _f32(host.light_pos), _f32(host.light_dir))
@@ -409,7 +410,7 @@ class BatchCamera:
             look["mat_rgba"] = jnp.concatenate([own, added], axis=1)
         if self._lamps:
             lights, of = (np.array(column) for column in zip(*self._lamps, strict=True))
-            on = jnp.broadcast_to(jnp.asarray(self._active), (worlds, len(self._active)))
+            on = jnp.broadcast_to(self._model.light_active, (worlds, self._host.nlight))
             look["light_active"] = on.at[:, lights].set(tint[:, of] == SWITCHED_ON)
         return look
 

@@ -10,11 +10,12 @@ Axes: V vertices, F triangles, G geoms.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.looks.visual import COSTUMES
 
@@ -47,14 +48,19 @@ class Part:
     face_geom: Int[np.ndarray, "F"]
 
 
-def rigid_parts(host: mujoco.MjModel, scene: mujoco.MjModel, groups: Sequence[int]) -> list[Part]:
+def rigid_parts(
+    host: mujoco.MjModel,
+    scene: mujoco.MjModel,
+    groups: Sequence[int],
+    covered: Mapping[int, Bool[np.ndarray, "F"]] = MappingProxyType({}),
+) -> list[Part]:
     """The parts of a render model, those that never move first.
 
     Meshes that are invisible (alpha 0) in the compiled scene are in no part.
 
     Args:
       host: the render model, which has no joints. scene: the model that it was made from, with the same bodies first.
-      groups: of geoms that are seen.
+      groups: of geoms that are seen. covered: by geom, which triangles nobody sees.
     """
     data = mujoco.MjData(host)
     mujoco.mj_forward(host, data)
@@ -67,7 +73,7 @@ def rigid_parts(host: mujoco.MjModel, scene: mujoco.MjModel, groups: Sequence[in
         welded = int(scene.body_weldid[body])
         mocap = int(scene.body_mocapid[scene.body_rootid[body]]) >= 0
         by_body.setdefault(welded if welded or not mocap else body, []).append(int(geom))
-    return [_part(host, data, geoms, moves=body > 0) for body, geoms in sorted(by_body.items())]
+    return [_part(host, data, geoms, covered, moves=body > 0) for body, geoms in sorted(by_body.items())]
 
 
 def alpha(model: mujoco.MjModel) -> Float[np.ndarray, "G"]:
@@ -78,7 +84,13 @@ def alpha(model: mujoco.MjModel) -> Float[np.ndarray, "G"]:
     return found
 
 
-def _part(host: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], moves: bool) -> Part:
+def _part(
+    host: mujoco.MjModel,
+    data: mujoco.MjData,
+    geoms: list[int],
+    covered: Mapping[int, Bool[np.ndarray, "F"]],
+    moves: bool,
+) -> Part:
     vertices, faces, owners, count = [], [], [], 0
     for geom in geoms:
         mesh = int(host.geom_dataid[geom])
@@ -86,7 +98,10 @@ def _part(host: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], moves: bo
         corners = slice(host.mesh_faceadr[mesh], host.mesh_faceadr[mesh] + host.mesh_facenum[mesh])
         in_world = host.mesh_vert[points] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
         vertices.append(in_world)
-        faces.append(host.mesh_face[corners] + count)
+        own = host.mesh_face[corners]
+        if geom in covered:  # a triangle without area keeps the numbers of the others
+            own = np.where(covered[geom][:, None], own[:, :1], own)
+        faces.append(own + count)
         owners.append(np.full(len(faces[-1]), geom))
         count += len(in_world)
     # The box around a mesh is centred on its frame: the geom is taken in whose frame it is smallest.

@@ -51,7 +51,7 @@ def make_render_model(
             spec.delete(element)
     for joint in list(spec.joints):
         spec.delete(joint)
-    decorate(spec, scene, looks)
+    decorate(spec, scene, looks, fine=False)
     body = spec.worldbody.add_body(name="ig2mj/particles")
     for k in range(slots):
         body.add_geom(
