@@ -65,9 +65,9 @@ def test_a_lamp_lights_the_home_while_it_is_on_and_where_it_is(home, visual):
 
 
 def test_the_light_of_a_bulb_fades_and_falls_on_what_faces_it():
-    bulb = Bulb((0.0, 0.0, 2.0), (0.2, 0.2, 0.1), (1.0, 0.0, 1.0))
+    bulb = Bulb((0.0, 0.0, 2.0), (0.02, 0.02, 0.01), (1.0, 0.0, 1.0))
     up = np.array([[0.0, 0.0, 1.0]])
     dark = shade(up, NIGHT)
     below, farther = (shade(up, NIGHT, 0.0, np.array([[0.0, 0.0, z]]), [bulb]) - dark for z in (1.0, -1.0))
-    assert below == pytest.approx(np.array([[0.1, 0.1, 0.05]])) and farther == pytest.approx(0.2 * below)
+    assert below == pytest.approx(np.array([[0.01, 0.01, 0.005]])) and farther == pytest.approx(0.2 * below)
     assert shade(-up, NIGHT, 0.0, np.zeros((1, 3)), [bulb]) == pytest.approx(shade(-up, NIGHT))
