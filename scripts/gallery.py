@@ -77,7 +77,7 @@ def night() -> None:
 def robots() -> None:
     """The robots that ship."""
     tiles = []
-    spot = {"humanoid": (1.85, 0.6), "fetch": (2.5, 0.75), "turtlebot": (1.2, 0.28)}
+    spot = {"humanoid": (1.85, 0.6), "fetch": (2.05, 0.7), "turtlebot": (1.2, 0.28)}
     for name, (distance, height) in spot.items():
         scene = load_scene("birch", [make_robot(name).at(1.7, -1.6, -1.2)])
         tiles.append(tile(scene, FreeView((1.7, -1.6, height), distance, 118.0, -16.0), name, (400, 400)))

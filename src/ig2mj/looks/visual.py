@@ -31,6 +31,9 @@ DECOR = "ig2mj/decoration"
 COSTUMES = "ig2mj/costumes"
 """Name of the body that has what robots wear. Its geoms are drawn on the robots' bodies."""
 
+OUTSIDE = "outside_"
+"""How names of materials of the garden and the sky begin."""
+
 FARTHEST = 120.0
 """m that is seen: beyond the sky of a home."""
 
@@ -138,10 +141,13 @@ def decorate(spec: mujoco.MjSpec, scene: Scene, looks: str, fine: bool = True) -
         return
     add_interior(build, plan, light)
     add_furnishing(build, plan, light)
-    add_outside(build, plan, light, night=looks == "night")
+    garden = Builder(fine)
+    add_outside(garden, plan, light, night=looks == "night")
     body = spec.worldbody.add_body(name=DECOR)
     for material, mesh in build.meshes():
         _add(spec, body, material, mesh)
+    for material, mesh in garden.meshes():
+        _add(spec, body, dataclasses.replace(material, name=f"{OUTSIDE}{material.name}"), mesh)
     for entry in scene.manifest.objects:
         if entry.category == "walls":
             for geom in (g for name in entry.bodies for g in spec.body(name).geoms if g.group == 0 and not g.material):

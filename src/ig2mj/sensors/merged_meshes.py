@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ig2mj.looks.visual import COSTUMES
+from ig2mj.looks.visual import COSTUMES, OUTSIDE
 
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 
@@ -54,7 +54,7 @@ def rigid_parts(
     groups: Sequence[int],
     covered: Mapping[int, Bool[np.ndarray, "F"]] = MappingProxyType({}),
 ) -> list[Part]:
-    """The parts of a render model, those that never move first.
+    """The parts of a render model, those that never move first; the garden is one of the others.
 
     Meshes that are invisible (alpha 0) in the compiled scene are in no part.
 
@@ -69,6 +69,9 @@ def rigid_parts(
     for geom in np.flatnonzero(seen):
         if geom >= scene.ngeom and host.body(host.geom_bodyid[geom]).name == COSTUMES:
             continue  # moves by itself
+        if geom >= scene.ngeom and host.geom(geom).name.startswith(f"ig2mj/{OUTSIDE}"):
+            by_body.setdefault(host.nbody, []).append(int(geom))  # few rays leave the house: not in the tree of all
+            continue
         body = int(scene.geom_bodyid[geom]) if geom < scene.ngeom else 0  # what else looks add stands still
         welded = int(scene.body_weldid[body])
         mocap = int(scene.body_mocapid[scene.body_rootid[body]]) >= 0
