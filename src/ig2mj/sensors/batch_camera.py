@@ -398,7 +398,7 @@ class BatchCamera:
             rgba = jnp.where(textured[..., None], jnp.asarray(OF_MATERIAL), rgba)
         plain = jnp.full((worlds, self.slots), -1, material.dtype)
         size = jnp.broadcast_to(jnp.asarray(self._size[:geoms]), (worlds, geoms, 3))
-        look = {
+        look: dict[str, Array] = {
             "geom_rgba": jnp.concatenate([rgba, of_slots], axis=1),
             "geom_matid": jnp.concatenate([material, plain], axis=1),
             "geom_size": jnp.concatenate([size, slots.size], axis=1),

@@ -101,7 +101,7 @@ def scene_glb(
     nodes = [glb.add("nodes", {"name": f"body_{b}"}) for b in range(known)]
     glb.json["scenes"][0]["nodes"] = nodes
     visible = np.flatnonzero(np.isin(model.geom_group, VISIBLE_GROUPS) & (model.geom_rgba[:, 3] > 0))
-    visible = np.array([geom for geom in visible if of_geoms[geom] < known], int)
+    visible = np.array([geom for geom in visible.tolist() if of_geoms[geom] < known], int)
     colours = mean_colours(model, visible)
     for geom, colour in zip(visible.tolist(), colours, strict=True):
         kind = int(model.geom_type[geom])
