@@ -119,15 +119,23 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Region:
-    """Where a held tool cleans: its box (m) from the hand's grasp point, when it is turned by `rotation`."""
+    """Where a held tool cleans when it is turned by `rotation`: corners of the part that cleans, and their box, m from
+    the hand's grasp point."""
 
     rotation: Rotation
+    corners: Float[np.ndarray, "n 3"]
     low: Vector
     high: Vector
 
+    @classmethod
+    def turned(cls, rotation: Rotation, corners: Float[np.ndarray, "n 3"]) -> _Region:
+        """`corners`: as the tool is held now."""
+        points = corners @ rotation.T
+        return cls(rotation, points, points.min(0), points.max(0))
+
     def at(self, spot: DirtSpot) -> Vector:
-        """Grasp point of the hand when the box is pressed on a particle."""
-        depth = float(np.abs(spot.normal) @ (self.high - self.low)) / 2
+        """Grasp point of the hand when the tool is pressed on a particle."""
+        depth = float(np.ptp(self.corners @ spot.normal)) / 2
         return spot.pos + spot.normal * (depth - PRESSED) - (self.low + self.high) / 2
 
     def covers(self, grip: Vector, spots: Sequence[DirtSpot]) -> list[DirtSpot]:
@@ -141,7 +149,7 @@ def _regions(world: PlannedWorld, tool: str, hand: int, stance: Stance, normal: 
     points = (world.vertices(tool) if area is None else area) - world.grip(hand)
     carried = about_vertical(stance.yaw - world.base[1])
     rotations = [carried] if area is None else [turn_onto(carried @ out, -normal) @ carried, carried]
-    return [_Region(r, (points @ r.T).min(0), (points @ r.T).max(0)) for r in rotations]
+    return [_Region.turned(r, points) for r in rotations]
 
 
 def _area(world: PlannedWorld, tool: str) -> tuple[Float[np.ndarray, "8 3"] | None, Vector]:
@@ -294,7 +302,7 @@ def _turned(world: PlannedWorld, tool: str, hand: int, region: _Region, normal: 
     x, y, z = normal
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     rotation = (np.eye(3) + s * k + (1 - c) * (k @ k)) @ region.rotation
-    return _Region(rotation, (points @ rotation.T).min(0), (points @ rotation.T).max(0))
+    return _Region.turned(rotation, points)
 
 
 def _press(
