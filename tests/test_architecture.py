@@ -41,6 +41,7 @@ LAYERS = [
     "testing",
     "demos",
     "learn",
+    "serving",
     "viewer",
     "simulation",
     "web",
@@ -276,7 +277,7 @@ def pyproject() -> dict:
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
-DATA_PACKAGES = ("ig2mj_demonstrations", "ig2mj_policies", "ig2mj_pools", "ig2mj_scenes")
+DATA_PACKAGES = ("ig2mj_demonstrations", "ig2mj_episodes", "ig2mj_policies", "ig2mj_pools", "ig2mj_scenes")
 """Homes, policies and demonstrations that ship: packed as they are, no Python among them."""
 
 

@@ -45,6 +45,10 @@ class ManifestError(InputError):
     """A scene's manifest.json does not fit its schema or its scene.xml."""
 
 
+class PolicyServerError(Ig2mjError):
+    """A policy server cannot be reached, takes too long, or answers with what is no action."""
+
+
 class PolicyMismatch(InputError):
     """A policy is for another task, robot, way of grasping, list of actions or observations; names the pair."""
 

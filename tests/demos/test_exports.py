@@ -274,11 +274,11 @@ def test_lerobot_has_a_row_for_every_step_and_says_what_each_column_is(recorded)
         (0, HORIZON),
         (HORIZON, 2 * HORIZON),
     ]
-    assert episodes[0]["tasks"] == [env.task.summary] and episodes[0]["stats/action/count"] == [HORIZON]
+    assert episodes[0]["tasks"] == [env.instruction()[0]] and episodes[0]["stats/action/count"] == [HORIZON]
     stats = json.loads((folder / "lerobot/meta/stats.json").read_text())
     assert np.allclose(stats["action"]["mean"], action.reshape(2 * HORIZON, -1).mean(0))
     tasks = pq.read_table(folder / "lerobot/meta/tasks.parquet")
-    assert tasks.to_pydict() == {"task_index": [0], "__index_level_0__": [env.task.summary]}
+    assert tasks.to_pydict() == {"task_index": [0], "__index_level_0__": [env.instruction()[0]]}
     with pytest.raises(InputError, match="is there already"), Recording(folder / "runs.h5") as recording:
         export_lerobot(Replayer(recording, env=env), folder / "lerobot")
 

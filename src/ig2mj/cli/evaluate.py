@@ -21,8 +21,8 @@ PURE_WORLDS = 1000
 
 @renamed_options({"--drawn": "--stochastic"})
 def run(
-    policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")],
-    episodes: int = 1000,
+    target: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")],
+    episodes: int | None = None,
     split: str = "held_out",
     engine: str | None = None,
     worlds: int = 0,
@@ -37,6 +37,14 @@ def run(
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     resume: Resume = False,
     task: TaskOption = None,
+    axes: str | None = None,
+    episode_file: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    page: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    policy: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None,
+    observations: str | None = None,
+    image_size: int = 224,
+    chunk: int = 0,
+    timeout: float = 60.0,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
     """Measure how often a policy succeeds, on start states that it was not trained on.
@@ -44,8 +52,9 @@ def run(
     Each start state is played once; with more episodes than start states they are played again.
 
     Args:
-      policy: a file that `ig2mj train` wrote, or the name of one that ships.
-      episodes: number of episodes; the start states of the split are played in order.
+      target: a file that `ig2mj train` wrote, or the name of a policy that ships; with --policy the name of a task.
+      episodes: number of episodes; the start states of the split are played in order. Default: 1000; with --axes, of
+        each axis, and with --policy 200.
       split: set of start states: held_out or train.
       engine: native, warp or jax; default: warp on a GPU, else native.
       worlds: number of worlds stepped at once; 0: one per episode, at most 1000 (native: 8).
@@ -60,6 +69,16 @@ def run(
       out: file for the JSON result; needed for --resume.
       resume: continue an interrupted evaluation.
       task: the policy's task, if it is defined in a file of yours; this imports the file.
+      axes: play fixed episodes (`ig2mj episodes`) in which this varies, next to those in which nothing does: names of
+        axes of `ig2mj.Randomize`, separated by commas, or all.
+      episode_file: a file of `ig2mj episodes make` in place of the one that ships.
+      page: with --axes, write a page with plots and images of failures.
+      policy: a policy server that acts: ws://HOST:PORT (openpi's protocol), vla-eval://HOST:PORT or groot://HOST:PORT.
+      observations: with --policy, names of observations that are sent; default: those that the server names, else
+        proprioception,rgb, and rgb of the right hand's camera.
+      image_size: with --policy, pixels of images in both directions, unless the server is of ig2mj.
+      chunk: with --policy, steps of a chunk of actions that are carried out; 0: all.
+      timeout: with --policy, seconds that an answer of the server may take.
       json: print one JSON object.
     """
     import contextlib
@@ -80,6 +99,23 @@ def run(
     from ig2mj.tasks.custom.files import refuse_unknown
     from ig2mj.tasks.pools import COUNT
 
+    if policy is not None or axes is not None:
+        from ig2mj.cli.common.fixed_episodes import Request, evaluate_policy, evaluate_server
+
+        where = Request(axes, episodes, episode_file, page, out, json, engine, worlds, robot, grasping)
+        refused = {"--jobs": jobs != 1, "--cluster": cluster is not None, "--resume": resume, "--object": bool(object)}
+        refused |= {"--pool-size": pool_size != 0, "--split": split != "held_out"}
+        for option, given in refused.items():
+            if given:
+                raise Ig2mjError(f"{option} does not go with --axes or --policy: they play the episodes of a file")
+        use_task(task)
+        if policy is not None:
+            return evaluate_server(target, policy, where, observations, image_size, chunk, timeout)
+        return evaluate_policy(target, where, stochastic)
+    for option, given in {"--episode-file": episode_file, "--page": page}.items():
+        if given is not None:
+            raise Ig2mjError(f"{option} goes with --axes")
+    episodes = 1000 if episodes is None else episodes
     if episodes < 1 or min(jobs, worlds) < 0:
         raise Ig2mjError(
             f"--episodes {episodes}, --jobs {jobs}, --worlds {worlds}: at least one episode, and none below 0"
@@ -89,7 +125,7 @@ def run(
     if out is not None:
         check_output(out)
     use_task(task)
-    file = find_policy(policy)
+    file = find_policy(target)
     loaded = Policy.load(file)
     depends = loaded.card["depends"]
     refuse_unknown(depends["task"], depends.get("task_file"), file)
@@ -118,7 +154,7 @@ def run(
     if episodes > states:
         words = f"--episodes {episodes}: there are {states} start states, so some are played and counted again"
         print(f"warning: {words}", file=sys.stderr)
-    where, title = where_of(jobs, cluster, resume), f"evaluating {policy}"
+    where, title = where_of(jobs, cluster, resume), f"evaluating {target}"
     starts = {"task": depends["task"], "split": split, "count": pool_size or None}
     starts |= {"objects": list(objects)} if objects else {}
     shared = {"policy": file.read_bytes(), **(shared_pool(**starts) if cluster is not None or jobs != 1 else {})}
@@ -145,7 +181,7 @@ def run(
             "env": depends["task"],
             "robot": depends["robot"],
             "grasping": settings["grasping"],
-            "agent": str(policy),
+            "agent": str(target),
             "weights": loaded.weights_digest,
             "paper_rl": settings["paper_rl"],
             "variant": 0,  # of the objects: policies are trained with the task's own

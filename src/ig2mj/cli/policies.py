@@ -77,4 +77,46 @@ def add(
     return 0
 
 
-SUBCOMMANDS = {"list": list_, "show": show, "add": add}
+def serve(
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")],
+    host: str = "127.0.0.1",
+    port: int = 8000,
+    stochastic: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> int:
+    """Answer observations with a policy's actions, by openpi's websocket protocol, until it is interrupted.
+
+    There is no access control: who reaches the port can ask the policy.
+
+    Args:
+      name: name of a policy that ships, or a file written by `ig2mj train`.
+      host: address to listen at; the default is reached from this machine alone.
+      port: to listen at.
+      stochastic: sample actions from the policy's distribution instead of taking its mode.
+    """
+    from ig2mj.envs.registry import make
+    from ig2mj.errors import Ig2mjError
+    from ig2mj.install_hint import require_extras
+    from ig2mj.learn.policies import Policy, looks_of, objects_of, robot_of
+    from ig2mj.learn.shipped import find_policy
+    from ig2mj.serving.server import ServedPolicy
+    from ig2mj.serving.server import serve as listen
+
+    if not 0 < port < 65536:
+        raise Ig2mjError(f"--port {port}: from 1 to 65535")
+    require_extras("serve")
+    file = find_policy(name)
+    policy = Policy.load(file)
+    depends = policy.card["depends"]
+    made = {"observations": policy.observations, "relaxed_thresholds": policy.card.get("paper_rl", False)}
+    made |= {"objects": objects_of(policy, file), "pool_size": 1, "looks": looks_of(policy)}
+    env = make(depends["task"], robot_of(policy.card), 1, "native", depends["grasping"], **made)
+    with listen(ServedPolicy(policy, env, file, stochastic or None), host, port) as server:
+        print(f"serving {name} at ws://{host}:{port} (Ctrl-C ends it)", flush=True)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            print()
+    return 0
+
+
+SUBCOMMANDS = {"list": list_, "show": show, "add": add, "serve": serve}

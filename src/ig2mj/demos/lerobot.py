@@ -28,9 +28,10 @@ from ig2mj.demos.replay import Replayed, Replayer
 from ig2mj.demos.selection import some_runs
 from ig2mj.demos.whole_output import whole_output
 from ig2mj.envs.environment import Environment
+from ig2mj.envs.lerobot import camera_key as key_of_camera
 from ig2mj.errors import InputError
 from ig2mj.install_hint import require_extras
-from ig2mj.sensors.cameras import split_name
+from ig2mj.sensors.cameras import HEAD, split_name
 
 VERSION = "v3.0"
 CHUNK_FILES, DATA_MB, VIDEO_MB = 1000, 100, 200
@@ -117,7 +118,7 @@ class DatasetWriter:
         env = replayer.env
         self.folder, self._fps, self._made = folder, _whole_rate(replayer), made_again(env)
         self._name, self._horizon = env.task.name, env.task.horizon
-        self._robot, self._task = env.robot, getattr(env.task, "summary", env.task.name)
+        self._robot, self._task = env.robot, env.instruction()[0]
         self._features = _features(env)
         self._videos = {
             name: EpisodeVideos(lambda place, name=name: self._at(VIDEO_PATH, place, video_key=name), self._fps, codec)
@@ -258,7 +259,7 @@ def _name(observation: str) -> str:
 def camera_key(observation: str) -> str:
     """Of images in colour in LeRobot's datasets and environments: `rgb` of the camera `head`, else the camera's."""
     camera, _ = split_name(observation)
-    return "rgb" if observation == "rgb" else camera.replace("/", "_")
+    return key_of_camera(camera if observation != camera else HEAD)
 
 
 def _is_rgb(observation: str) -> bool:

@@ -31,8 +31,8 @@ Choose = Callable[..., tuple[Array, Array]]
 """Actions [W, n] and what is remembered [W, m], from observations by name, what was remembered, in which worlds an
 episode begins [W], a key and, where an actor has them, parameters. Pure."""
 
-Ending = tuple[Array, Array, Array, dict[str, Array]]
-"""Reward, `terminated`, `truncated` and what a tally needs of `info`."""
+Ending = tuple[Array, Array, Array, dict[str, Array], Array]
+"""Reward, `terminated`, `truncated`, what a tally needs of `info`, and the truth of the goal's literals."""
 
 
 @struct.dataclass
@@ -42,6 +42,7 @@ class Tally:
     Attributes:
       going: not over yet. success: how they ended. outcomes: the same of what the task measures, by name
         (`ig2mj.tasks.objective.Objective.outcomes`). total: the return. steps: that were taken.
+      literals: truth of the goal's literals at the end, of those that go on now.
     """
 
     going: Bool[Array, "W"]
@@ -49,16 +50,19 @@ class Tally:
     outcomes: dict[str, Bool[Array, "W"]]
     total: Float[Array, "W"]
     steps: Int[Array, ""] | np.int32
+    literals: Bool[Array, "W L"]
 
     @classmethod
     def begun(cls, state: EnvState, outcomes: Sequence[str] = ()) -> Tally:
         """At the start of episodes. `outcomes`: names of what the task measures."""
         none = np.zeros(np.shape(state.reward), bool)
-        return cls(~none, none, {name: none for name in outcomes}, none.astype(np.float32), np.int32(0))
+        literals = np.asarray(state.status.literals)
+        return cls(~none, none, {n: none for n in outcomes}, none.astype(np.float32), np.int32(0), literals)
 
     def after(self, ending: Ending) -> Tally:
         """After a step of all worlds, of which those that were over count no more."""
-        reward, terminated, truncated, info = ending
+        reward, terminated, truncated, info, literals = ending
+        where = np.where if isinstance(self.going, np.ndarray) and isinstance(literals, np.ndarray) else jnp.where
         ends, going = self.going & (terminated | truncated), self.going & ~(terminated | truncated)
         return Tally(
             going,
@@ -66,12 +70,14 @@ class Tally:
             {name: before | (ends & info[name]) for name, before in self.outcomes.items()},
             self.total + reward * self.going,
             self.steps + np.int32(1),
+            where(self.going[:, None], literals, self.literals),
         )
 
 
 def ending(state: EnvState, outcomes: Sequence[str] = ()) -> Ending:
     """What a tally needs of a state. `outcomes`: names of what the task measures."""
-    return state.reward, state.terminated, state.truncated, {n: state.info[n] for n in ("success", *outcomes)}
+    info = {n: state.info[n] for n in ("success", *outcomes)}
+    return state.reward, state.terminated, state.truncated, info, state.status.literals
 
 
 @entry_point

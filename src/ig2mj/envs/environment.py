@@ -35,6 +35,7 @@ from ig2mj.envs.checks import checked_action, checked_state
 from ig2mj.envs.config import Configured, EnvConfig
 from ig2mj.envs.copies import StateCopies
 from ig2mj.envs.images import StateImages
+from ig2mj.envs.instructed import Instructed
 from ig2mj.envs.observations import Observer, Space
 from ig2mj.envs.state import EnvState, Seen, StepContext
 from ig2mj.errors import EngineError
@@ -60,7 +61,7 @@ Companions = Callable[[UInt[Array, "W 2"], Int[Array, "W"]], Float[Array, "W m"]
 
 
 @entry_point
-class Environment(StateCopies, StateImages, Configured):
+class Environment(StateCopies, StateImages, Instructed, Configured):
     """See the module's text; `ig2mj.make` makes one.
 
     Attributes:

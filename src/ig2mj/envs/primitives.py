@@ -28,13 +28,13 @@ from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.problem import Problem, problem_of
-from ig2mj.planning.quality import quality
 from ig2mj.planning.rung import Rung
 from ig2mj.planning.steps import PRIMITIVES, PlanningError, Step, make_step
 from ig2mj.planning.symbolic import symbolic_episodes
 from ig2mj.planning.words import step_of
 from ig2mj.predicates.explain import value_of
 from ig2mj.predicates.logic import Atom
+from ig2mj.predicates.quality import quality
 from ig2mj.process import entry_point
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.tasks.own_goal import split_goal_name
@@ -57,7 +57,7 @@ class PrimitiveEnv(gymnasium.Env):
       problem: what is to be reached. actions: the discrete actions: primitives with objects that the problem names, and
         with tools, taps and sources of heat and cold. fact_names: of the observation's F entries.
       action_space: Discrete, numbers of `actions`; `step` takes other requests, too. observation_space: MultiBinary(F).
-      reward: of a step is by how much q grows (`ig2mj.planning.quality`), so that the return of an episode is its q.
+      reward: of a step is by how much q grows (`ig2mj.predicates.quality`), so that the return of an episode is its q.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012

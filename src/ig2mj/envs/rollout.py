@@ -9,7 +9,7 @@ import collections
 import dataclasses
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import jax
 import numpy as np
@@ -18,6 +18,8 @@ from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.view import Array
 from ig2mj.envs.actor import STEPS, Actor, Tally, ending, resting
 from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.errors import PolicyServerError
+from ig2mj.predicates.quality import quality
 from ig2mj.process import entry_point
 
 Act = Callable[[EnvState], Array]
@@ -37,6 +39,8 @@ class Played:
       steps: agent steps that were taken in all worlds together.
       steps_per_second: of them on the wall, without the first step, which compiles.
       metrics: `Environment.metrics` of all episodes together. state: of all worlds at the end.
+      q: partial credit (`ig2mj.predicates.quality`), where episodes were played in order. failed: what ended an
+        evaluation before its last episode; the other attributes are of the episodes that were over then.
     """
 
     success: list[bool]
@@ -46,6 +50,8 @@ class Played:
     steps_per_second: float
     metrics: dict[str, int]
     state: EnvState
+    q: list[float] = dataclasses.field(default_factory=list)
+    failed: PolicyServerError | None = None
 
 
 @entry_point
@@ -58,6 +64,7 @@ def play(
     watch: Watch | None = None,
     first: int = 0,
     report: ProgressCallback = no_progress,
+    seeds: Sequence[int] | None = None,
 ) -> Played:
     """Plays episodes.
 
@@ -65,11 +72,11 @@ def play(
       act: who acts. seed: of the start states that are drawn.
       in_order: begin with the rows of the environment's pool, each once; again from the first where there are fewer.
         Where an episode is over actions are zero until all are.
-      first: of these rows.
+      first: of these rows. seeds: of the episode that begins with each row, in place of `seed`.
       report: called after every step with a share of the episodes (0 to 1) and 1.
     """
     if in_order:
-        return _in_order(env, act, episodes, seed, watch, first, report)
+        return _in_order(env, act, episodes, seed if seeds is None else seeds, watch, first, report)
     return _drawn(env, act, episodes, seed, watch, report)
 
 
@@ -104,40 +111,72 @@ def _drawn(
 
 
 def _in_order(
-    env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, start: int, report: ProgressCallback
+    env: Environment,
+    act: Act,
+    episodes: int,
+    seed: int | Sequence[int],
+    watch: Watch | None,
+    start: int,
+    report: ProgressCallback,
 ) -> Played:
     size, worlds = env.core.starts.pool.size, env.num_worlds
     tallies, pace, state, metrics = list[Tally](), Pace(watch), None, collections.Counter[str]()
+    begun, failed = list[np.ndarray](), None
     for first in range(0, episodes, worlds):
-        state = env.start_from((start + first + np.arange(worlds)) % size, seed)
+        rows = (start + first + np.arange(worlds)) % size
+        state = env.start_from(rows, seed if isinstance(seed, int) else [seed[int(row)] for row in rows])
         pace.look(state)
         tally = Tally.begun(state, env.objective.outcomes)
-        while tally.going.any():
-            before = int(tally.steps)
-            if isinstance(act, Actor) and env.pure and watch is None:
-                state, tally = act.several(state, tally, STEPS if pace.begun else 1)
-            else:
-                state = env.step(state, resting(act(state), tally.going))
-                tally = tally.after(jax.device_get(ending(state, env.objective.outcomes)))
-            pace.stepped(worlds * (int(tally.steps) - before))
-            pace.look(state)
-            over = min(first + worlds - int(np.asarray(tally.going).sum()), episodes)
-            step = int(tally.steps)
-            share = min((first + min(step / env.task.horizon, 1.0) * worlds) / episodes, 1.0)
-            words = f"{over} of {episodes} episodes, step {step} of at most {env.task.horizon}"
-            report(max(share, over / episodes), 1, words)
+        begun.append(np.asarray(state.status.literals))
+        try:
+            while tally.going.any():
+                before = int(tally.steps)
+                if isinstance(act, Actor) and env.pure and watch is None:
+                    state, tally = act.several(state, tally, STEPS if pace.begun else 1)
+                else:
+                    state = env.step(state, resting(act(state), tally.going))
+                    tally = tally.after(jax.device_get(ending(state, env.objective.outcomes)))
+                pace.stepped(worlds * (int(tally.steps) - before))
+                pace.look(state)
+                over = min(first + worlds - int(np.asarray(tally.going).sum()), episodes)
+                step = int(tally.steps)
+                share = min((first + min(step / env.task.horizon, 1.0) * worlds) / episodes, 1.0)
+                words = f"{over} of {episodes} episodes, step {step} of at most {env.task.horizon}"
+                report(max(share, over / episodes), 1, words)
+        except PolicyServerError as e:
+            failed = e
         tallies.append(jax.device_get(tally))
         metrics.update(env.metrics(state))
+        if failed is not None:
+            break
+
+    over = np.concatenate([~np.asarray(tally.going) for tally in tallies])[:episodes]
 
     def joined(of: Callable[[Tally], Array]) -> list:
-        return np.concatenate([of(tally) for tally in tallies])[:episodes].tolist()
+        return np.concatenate([of(tally) for tally in tallies])[:episodes][over].tolist()
 
     assert state is not None
     outcomes = {name: joined(lambda t, name=name: t.outcomes[name]) for name in env.objective.outcomes}
     steps = worlds * sum(int(tally.steps) for tally in tallies)
     pace_now = pace.steps_per_second()
     success, total = joined(lambda t: t.success), joined(lambda t: t.total)
-    return Played(success, outcomes, total, steps, pace_now, dict(metrics), state)
+    q = _qualities(env, np.concatenate(begun)[:episodes][over], np.array(joined(lambda t: t.literals)), success)
+    return Played(success, outcomes, total, steps, pace_now, dict(metrics), state, q, failed)
+
+
+def _qualities(env: Environment, begun: np.ndarray, ended: np.ndarray, success: Sequence[bool]) -> list[float]:
+    """q of episodes, from the truth of the goal's literals at the start and at the end; 1 where the task was done, and
+    0 elsewhere where the task has no goal expression."""
+    rules = env.core.rules
+    goal = None if rules is None else rules.goal
+    found = []
+    for k, done in enumerate(success):
+        if done or goal is None:
+            found.append(float(done))
+        else:
+            truths = (dict(zip(goal.atoms, map(bool, literals[k]), strict=True)) for literals in (begun, ended))
+            found.append(quality(goal.ground, *truths))
+    return found
 
 
 class Pace:

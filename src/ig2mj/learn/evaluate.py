@@ -62,6 +62,7 @@ def summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "success_high": round(high, 4),
         **{f"{name}_rate": sum(sum(r["outcomes"][name]) for r in results) / count for name in results[0]["outcomes"]},
         "mean_return": float(np.mean(total)),
+        **({"q": round(float(np.mean(q)), 4)} if (q := [x for r in results for x in r.get("q", ())]) else {}),
         **{name: sum(r[name] for r in results) for name in ("overflow", "non_finite")},
     }
 
@@ -120,7 +121,7 @@ def evaluate_job(
         raise WholeRunError(e) from e
     with progress(f"playing {task} from start state {first}") as report:
         played = play(env, actor.seeded(first // worlds), episodes, in_order=True, first=first, report=report)
-    found = {"success": played.success, "outcomes": played.outcomes, "total": played.total}
+    found = {"success": played.success, "outcomes": played.outcomes, "total": played.total, "q": played.q}
     trouble = {"overflow": played.metrics["overflow"], "non_finite": played.metrics["not_finite"]}
     stepping = (played.steps - worlds) / played.steps_per_second if played.steps_per_second else 0.0
     start = time.monotonic() - began - stepping

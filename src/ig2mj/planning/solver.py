@@ -10,12 +10,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ig2mj.planning.quality import quality
 from ig2mj.planning.rung import Rung
 from ig2mj.planning.steps import Outcome, PlanningError, Step
 from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
 from ig2mj.predicates.explain import value_of
 from ig2mj.predicates.logic import Atom
+from ig2mj.predicates.quality import quality
 from ig2mj.sampling.conditions import Condition
 
 MOST_STEPS, EXTRA_STEPS = 4, 12
@@ -36,7 +36,7 @@ class EpisodeResult:
     """What became of one episode.
 
     Attributes:
-      success: the goal holds at the end. q: partial credit (`ig2mj.planning.quality.quality`).
+      success: the goal holds at the end. q: partial credit (`ig2mj.predicates.quality.quality`).
       steps: in order. replans: plans that are not the rest of the plan before. planned: steps of the first plan.
       seconds: wall time. time: simulated seconds. ended: why it ended without success, in words, else "".
     """

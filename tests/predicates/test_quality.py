@@ -2,8 +2,8 @@
 
 import pytest
 
-from ig2mj.planning.quality import quality
 from ig2mj.predicates.logic import And, Atom, Or
+from ig2mj.predicates.quality import quality
 
 A, B, C, D = (Atom(name, ("x",)) for name in "abcd")
 ATOMS = (A, B, C, D)
