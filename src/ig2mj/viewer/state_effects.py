@@ -1,4 +1,5 @@
-"""What states look like besides colours: steam of what is hot, smoke of what is burnt, frost, drops, lamps that glow.
+"""What states look like besides colours: steam of what is hot, smoke of what is burnt, frost, drops, lamps that glow;
+and substances (`ig2mj.viewer.substance_marks`).
 
 They are marks (`ig2mj.viewer.state_marks`): drawn in images, videos and windows for people, and in no robot's camera.
 """
@@ -16,6 +17,7 @@ from ig2mj.sensors.tints import TINTS, WATER_COLOUR
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.viewer.state_marks import Mark, tint_of_objects
+from ig2mj.viewer.substance_marks import substance_marks
 
 STEAMS = 60.0
 """Degrees Celsius from which steam rises."""
@@ -71,7 +73,7 @@ def effects(
             top = np.array([*(low[k] + high[k])[:2] / 2, high[k][2] - 0.1])
             for radius in (0.14, 0.24, 0.36):
                 found.append(Mark(mujoco.mjtGeom.mjGEOM_SPHERE, (radius,) * 3, top, np.eye(3), GLOW))
-    return found
+    return found + substance_marks(model, states, view, world, time)
 
 
 def _rising(low: np.ndarray, high: np.ndarray, rgba: tuple[float, ...], seed: int, time: float | int) -> list[Mark]:

@@ -40,7 +40,8 @@ class Containers:
       object, body: of each. litres: what it holds when its opening faces up.
       rim: corners of the opening, in order. centre: their mean. normal: unit, out of the opening. side: unit, in the
         plane of the opening, from which directions are counted.
-      capacity: litres that stay in, by tilt and direction. drains: it has a drain.
+      capacity: litres that stay in, by tilt and direction. drains: it has a drain. filling: points spread evenly over
+        the inside of each.
     """
 
     object: Int[np.ndarray, "C"]
@@ -52,6 +53,7 @@ class Containers:
     side: Float[np.ndarray, "C 3"]
     capacity: Float[np.ndarray, "C A B"]
     drains: Bool[np.ndarray, "C"]
+    filling: tuple[np.ndarray, ...]
 
     @classmethod
     def build(
@@ -77,6 +79,7 @@ class Containers:
             side=_stacked([r.side for r in rows], (3,)),
             capacity=_stacked([r.capacity for r in rows], (TILTS, DIRECTIONS)),
             drains=drains[objects],
+            filling=tuple(r.filling for r in rows),
         )
 
     def row_of(self, obj: int) -> int | None:
@@ -134,6 +137,7 @@ class _Shape:
     normal: Float[np.ndarray, "3"]
     side: Float[np.ndarray, "3"]
     capacity: Float[np.ndarray, "A B"]
+    filling: Float[np.ndarray, "P 3"]
 
 
 def _shape(inside: InsideEntry) -> _Shape:
@@ -146,7 +150,8 @@ def _shape(inside: InsideEntry) -> _Shape:
     side = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     side -= normal * (side @ normal)
     side /= np.linalg.norm(side)
-    return _Shape(_with_corners(rim), normal, side, _capacity(inside, rim, normal, side))
+    points = _filling(np.array(inside.vertices, float))
+    return _Shape(_with_corners(rim), normal, side, _capacity(inside.litres, points, rim, normal, side), points)
 
 
 def _with_corners(rim: Float[np.ndarray, "M 3"]) -> Float[np.ndarray, "R 3"]:
@@ -157,10 +162,13 @@ def _with_corners(rim: Float[np.ndarray, "M 3"]) -> Float[np.ndarray, "R 3"]:
 
 
 def _capacity(
-    inside: InsideEntry, rim: Float[np.ndarray, "M 3"], normal: Float[np.ndarray, "3"], side: Float[np.ndarray, "3"]
+    litres: float,
+    points: Float[np.ndarray, "P 3"],
+    rim: Float[np.ndarray, "M 3"],
+    normal: Float[np.ndarray, "3"],
+    side: Float[np.ndarray, "3"],
 ) -> Float[np.ndarray, "A B"]:
-    """Litres below the lowest corner of the rim, by tilt and direction."""
-    points = _filling(np.array(inside.vertices, float))
+    """Litres below the lowest corner of the rim, by tilt and direction. `points`: of the inside."""
     tilt = np.linspace(0, np.pi, TILTS)[:, None, None]
     turn = (np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS))[None, :, None]
     across = np.cross(normal, side)
@@ -168,7 +176,7 @@ def _capacity(
     level = (up @ rim.T).min(-1)
     share = ((up @ points.T) <= level[..., None] + 1e-9).mean(-1)
     share[0] = 1.0
-    return (inside.litres * share).astype(np.float32)
+    return (litres * share).astype(np.float32)
 
 
 def _filling(vertices: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "P 3"]:
