@@ -9,6 +9,7 @@ from ig2mj.cli import call
 from ig2mj.cli.common.plan_benchmark import figure_cells, primitive_figures
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.requests import MEASURED, RequestSource
+from ig2mj.simulation.requests import RequestBench
 from ig2mj.states.model import StateModel
 
 
@@ -74,3 +75,10 @@ def test_results_of_something_else_are_refused(tmp_path, capsys):
     file.write_text(json.dumps({"a": 1}) + "\n")
     assert call(["plan", "--benchmark", "--out", str(file)]) == 2
     assert "is not a result of a request" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_requests_are_carried_out_on_the_kinematic_rung():
+    bench = RequestBench("small_home", "kinematic")
+    row = bench.run("open", 0)
+    assert row["prepared"] and row["solution"] and row["reason"] == "" and row["planning"] > 0

@@ -132,6 +132,7 @@ class RequestBench:
         self._query = SceneQuery(scene)
         if rung == "physics":
             self._simulation = Simulation(scene, seed=seed, grasping="assisted")
+            self._simulation.agent.rung.step()  # compiles, in no request's time
         else:
             self._stage, self._planner = KinematicStage(scene), MotionPlanner(scene)
 
