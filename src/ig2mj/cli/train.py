@@ -124,6 +124,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
     from ig2mj.cluster.process_topology import find_topology
     from ig2mj.cluster.team import Team
     from ig2mj.envs.registry import VECTORS, make
+    from ig2mj.envs.several_homes import HomesEnvironment
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.algorithms import make_algorithm
     from ig2mj.learn.bc import begin_as_clone
@@ -171,6 +172,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
                 sensors=SensorOptions(rows=rendered_rows(settings.rows, settings.image_size)),
                 objects=chosen.objects,
                 looks=settings.looks,
+                **settings.varied,
             )
             note_changes(world.scene, chosen.objects)
         depth_range = settings.depth_range or depth_range_of(world)
@@ -210,6 +212,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
             "devices": max(len(shared), 1),
             "device": f"{device.device_kind} ({platform.machine()})",
             "scene": world.scene.digest,
+            **({"homes": list(world.homes)} if isinstance(world, HomesEnvironment) else {}),
             **robot_folder(world.made_with.get("robot")),
             **objects_on_card(world),
             **extra,

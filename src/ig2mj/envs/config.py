@@ -89,7 +89,8 @@ class Overrides(EngineOptions, total=False):
     period: float
     horizon: int | None
     variant: int
-    home: str | os.PathLike | None
+    home: str | os.PathLike | Sequence[str | os.PathLike] | None
+    homes: str | Sequence[str] | None
     objects: Objects
     randomize: Randomize | Mapping[str, Any] | None
     engine_options: EngineOptions
@@ -138,7 +139,8 @@ class EnvConfig:
       relaxed_thresholds: the success thresholds of the paper's experiments: any force slices, and three quarters of
         the stains may remain. Only of the paper's activities.
       pool: start states of an activity; None: the task's own.
-      split: of the task's own start states, "train" or "held_out".
+      split: "train", "held_out" (start states), "held_out:objects", "held_out:homes" or "held_out:all"
+        (`ig2mj.tasks.splits`).
       pool_size: number of the task's own start states; None: all. They are sampled on first use and cached
         (`ig2mj sample-task`); navigation makes its own each time.
       augment_starts: number of start states made from those (`ig2mj.tasks.mixing`): each object lies as in one of
@@ -155,7 +157,8 @@ class EnvConfig:
       variant: which models the activity's objects have (`ig2mj.tasks.variants`); 0: the task's own. Each variant has
         its own start states.
       home: a home in place of the task's, by name or folder: any with a floor map for navigation, any that the
-        activity can be bound in for BDDL, and one with the furniture that the task names for the paper's activities.
+        activity can be bound in for BDDL, and one with the furniture that the task needs for the paper's activities
+        (`ig2mj.tasks.relocation`). A list: several at once (`ig2mj.make`).
       objects: what is added to the home, folders that `ig2mj convert object` wrote or names of the object library, each
         with a place if it has one (`ig2mj.load_scene`). In the paper's activities and in tasks of your own,
         "obj/mug@on_top:breakfast_table_0" is a further condition of the start states: the mug is in another place in
@@ -183,7 +186,7 @@ class EnvConfig:
     period: float = ACTION_PERIOD
     horizon: int | None = None
     variant: int = 0
-    home: str | os.PathLike | None = None
+    home: str | os.PathLike | Sequence[str | os.PathLike] | None = None
     objects: Objects = ()
     randomize: Randomize | None = None
     engine_options: EngineOptions = dataclasses.field(default_factory=lambda: EngineOptions())

@@ -30,6 +30,7 @@ from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, activity_name, short_name, unknown_environment
 from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, EnvSetup, setup_activity, setup_bddl, setup_navigation
+from ig2mj.envs.several_homes import HomesEnvironment
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.sensors.registry import SENSORS
@@ -49,6 +50,8 @@ from ig2mj.tasks.own_goal import goal_task, split_goal_name
 from ig2mj.tasks.pools import check_pool
 from ig2mj.tasks.registry import REGISTERED, load_task, split_reference
 from ig2mj.tasks.registry import TASKS as TASK_NAMES
+from ig2mj.tasks.relocation import reason_against
+from ig2mj.tasks.splits import HELD_OUT_HOMES, TRAIN_HOMES, Split
 from ig2mj.tasks.task import Task
 from ig2mj.tasks.variants import variant as task_variant
 from ig2mj.worlds.core import Core
@@ -164,12 +167,15 @@ def make(
         `engine` and `grasping`.
       worlds: see `EnvConfig`. engine: likewise. grasping: likewise.
       config_overrides: settings by name, in place of those of `config`.
-      overrides: likewise, as keyword arguments: fields of `EnvConfig` and options of the engine (`EngineOptions`).
+      overrides: likewise, as keyword arguments: fields of `EnvConfig`, options of engines (`EngineOptions`), `homes`.
       action_space: "continuous", or "primitives": a `ig2mj.envs.primitives.PrimitiveEnv`, a Gymnasium environment whose
         arguments the overrides then are.
 
+    `homes`: "train" or "held_out", the homes of that set that the task fits into (`ig2mj.tasks.splits`), or a list.
+    With several homes, also as `home=[...]`, worlds are shared out evenly, and the result is a `HomesEnvironment`.
+
     Returns:
-      An `Environment`, or what the action space says.
+      An `Environment`, a `HomesEnvironment`, or what the action space says.
 
     Raises:
       UnknownNameError: no such environment, robot, mode, observation, engine, setting or split; with near matches.
@@ -183,6 +189,7 @@ def make(
         others = {**given, "config": config, "config_overrides": config_overrides}
         return _make_other(action_space, name, overrides, others)
     overrides = {**{k: value for k, value in given.items() if value is not None}, **overrides}
+    homes = overrides.pop("homes", None)
     task = task_named(name)
     if isinstance(config, EnvConfig):
         chosen = config
@@ -190,7 +197,56 @@ def make(
         chosen = EnvConfig().override(config)
     else:
         chosen = EnvConfig().override(robot=config)
-    return _make(task, chosen.override(config_overrides, **overrides))
+    chosen = chosen.override(config_overrides, **overrides)
+    requested = _homes(task, chosen, homes)
+    return _make(task, chosen) if requested is None else _make_several(task, chosen, requested)
+
+
+def _homes(task: AnyTask, config: EnvConfig, homes: Any) -> tuple[str, ...] | None:
+    """Several homes that are asked for; None: one. Raises UnknownNameError, EngineError: these cannot be."""
+    split = Split.of(config.split)
+    if homes is not None and config.home is not None:
+        raise EngineError("home= and homes=: give one of them")
+    if config.home is not None and not isinstance(config.home, str | os.PathLike):
+        for home in config.home:
+            split.check_home(home)
+        return tuple(os.fspath(home) for home in config.home)
+    split.check_home(config.home)
+    if homes is None and (split.homes == "train" or config.home is not None):
+        return None
+    part = split.homes if homes is None else homes
+    if not isinstance(part, str):
+        return _homes(task, dataclasses.replace(config, home=part), None)
+    if part not in HOMES:
+        raise UnknownNameError("set of homes", str(part), HOMES)
+    if part == "train" and split.homes == "held_out":
+        raise EngineError(f"homes='train' and split='{split.name}': this split takes held-out homes")
+    if not isinstance(task, Task):
+        return HOMES[part]
+    fitting = tuple(home for home in HOMES[part] if not reason_against(task, home))
+    if not fitting:
+        reasons = "; ".join(reason_against(task, home) for home in HOMES[part])
+        raise EngineError(f"{task.name} fits into none of the homes {', '.join(HOMES[part])}: {reasons}")
+    return fitting
+
+
+HOMES = {"train": TRAIN_HOMES, "held_out": HELD_OUT_HOMES}
+"""Sets of homes by name."""
+
+
+def _make_several(task: AnyTask, config: EnvConfig, homes: tuple[str, ...]) -> HomesEnvironment:
+    """A task in several homes, worlds shared out evenly. Raises EngineError: there are fewer worlds than homes."""
+    whole_number("worlds", config.worlds)
+    if config.pool is not None:
+        raise EngineError("a pool is of one home: several homes have start states of their own")
+    if config.worlds < len(homes):
+        raise EngineError(f"{config.worlds} worlds in {len(homes)} homes: give each home at least one (worlds=...)")
+    shares = [config.worlds // len(homes) + (k < config.worlds % len(homes)) for k in range(len(homes))]
+    made = [
+        _make(task, dataclasses.replace(config, home=home, worlds=share))
+        for home, share in zip(homes, shares, strict=True)
+    ]
+    return HomesEnvironment(made)
 
 
 ACTION_SPACES = {"continuous": "", "primitives": "ig2mj.envs.primitives:PrimitiveEnv"}
@@ -212,6 +268,7 @@ def _make_other(action_space: str, name: Any, options: Mapping[str, Any], others
 
 def _make(task: AnyTask, config: EnvConfig) -> Environment:
     if config.home is not None:
+        assert isinstance(config.home, str | os.PathLike), "several homes are made one by one"
         task = in_home(task, config.home)
     objects = object_texts(config.objects)
     single = isinstance(config.observations, str) or callable(config.observations)
@@ -252,7 +309,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     task = dataclasses.replace(task, horizon=_horizon(task, config))
     whole = config.whole_actions or (isinstance(task, Task) and task.whole_actions)
     control = Control(whole, config.period)
-    split, pool_size = config.split, config.pool_size
+    split, pool_size = Split.of(config.split).starts, config.pool_size
     if isinstance(task, NavigationTask):
         setup = setup_navigation(task, body, split, pool_size, control)
     elif isinstance(task, BddlTask):

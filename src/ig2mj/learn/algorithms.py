@@ -107,6 +107,7 @@ def make_algorithm(
       Ig2mjError: settings that do not go together, or that the environment has nothing for.
     """
     check_settings(config, occlusion)
+    env = getattr(env, "envs", (env,))[0]  # of several homes the first: all have the same shapes
     size, horizon = env.action_space.shape[0], horizon_of(env)
     encoder: Encoder | None = None
     if config.encoder == glimpses.NAME:

@@ -25,10 +25,12 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from ig2mj.cluster.team import Team
 from ig2mj.engine.view import Array
+from ig2mj.envs.experts import expert_of
 from ig2mj.errors import EngineError
 from ig2mj.learn.collect import NativeCollector, Play, TrainingEnv, begin, collect_fn
 from ig2mj.learn.nonempty_leaves import nonempty, nonempty_specs, restored, shards_of
 from ig2mj.learn.perception import Perception
+from ig2mj.learn.protocols import as_adviser
 
 AXIS = "devices"
 """The axis of devices, over which algorithms average gradients."""
@@ -146,6 +148,74 @@ class OneDevice:
             learner, buffer, losses = self.learn(learner, buffer, rollout, learn_key, share, go)
         sums, losses = jax.device_get((sums, losses))
         return learner, buffer, play, floats(sums), {**floats(losses), "clock": clock}, spent
+
+
+class SeveralHomes:
+    """The same over several homes on one device: each home's worlds play in a program of their own, with an expert of
+    their own, and one program learns from all of it."""
+
+    def __init__(self, env: Any, algorithm: Algorithm):
+        """`env`: an `ig2mj.envs.several_homes.HomesEnvironment`."""
+        self._env, self._algorithm, self.num_worlds = env, algorithm, env.num_worlds
+        helped = algorithm.adviser is not None
+        self._advisers = [as_adviser(expert_of(part)) if helped else None for part in env.envs]
+        self._play = [self._player(k) for k in range(len(env.envs))]
+        self._compiled: list[Callable[..., Any]] | None = None
+
+        def learn(learner: Any, buffer: Any, rollouts: list[Any], key: Array, progress: Array, ready: Array) -> Any:
+            rollout = jax.tree.map(lambda *parts: jnp.concatenate(parts, axis=1), *rollouts)
+            learner, buffer, losses = algorithm.learn(learner, buffer, rollout, key, progress, ready)
+            return learner, buffer, {**losses, "all_finite": finite(learner)}
+
+        self._learn = jax.jit(learn, donate_argnums=(0, 1))
+
+    def _player(self, k: int) -> Any:
+        part, algorithm, adviser = self._env.envs[k], self._algorithm, self._advisers[k]
+        if not part.pure:
+            return NativeCollector(part, algorithm.perception, algorithm.act, adviser)
+
+        def collect(learner: Any, play: Play, key: Array) -> Any:
+            return collect_fn(part, algorithm.perception, algorithm.act, adviser, learner, play, key, algorithm.length)
+
+        return jax.jit(collect, donate_argnums=1)
+
+    def buffer(self) -> Any:
+        """What belongs to the worlds, at first."""
+        return self._algorithm.buffer(self.num_worlds)
+
+    def begin(self, seed: int) -> list[Play]:
+        """All worlds at the start of an episode, home by home."""
+        state = self._algorithm.acting_state
+        parts = enumerate(self._env.envs)
+        return [begin(part, state(part.num_worlds), self._env.seed_of(k, seed)) for k, part in parts]
+
+    def place(self, learner: Any, buffer: Any) -> tuple[Any, Any]:
+        """Where an iteration wants them."""
+        return jax.tree.map(jnp.asarray, (learner, buffer))
+
+    def __call__(
+        self, learner: Any, buffer: Any, plays: list[Play], key: Array, progress: float, ready: bool, clock: float = 0.0
+    ) -> tuple[Any, Any, list[Play], dict[str, float], dict[str, float], float]:
+        """As `OneDevice.__call__`."""
+        play_key, learn_key = jax.random.split(key)
+        keys = jax.random.split(play_key, len(plays))
+        if self._env.pure and self._compiled is None:
+            lowered = [play.lower(learner, part, one) for play, part, one in zip(self._play, plays, keys, strict=True)]
+            with ThreadPoolExecutor(len(lowered), "ig2mj-homes") as threads:
+                self._compiled = list(threads.map(lambda program: program.compile(), lowered))
+        began = time.perf_counter()
+        if self._compiled is not None:
+            done = [act(learner, part, one) for act, part, one in zip(self._compiled, plays, keys, strict=True)]
+        else:
+            length = self._algorithm.length
+            done = [act(learner, part, one, length)[:3] for act, part, one in zip(self._play, plays, keys, strict=True)]
+        plays, rollouts, sums = ([one[k] for one in done] for k in range(3))
+        jax.block_until_ready(sums)
+        spent = time.perf_counter() - began
+        share, go = jnp.float32(progress), jnp.bool_(ready)
+        learner, buffer, losses = self._learn(learner, buffer, rollouts, learn_key, share, go)
+        total = {name: sum(float(np.asarray(one[name])) for one in sums) for name in sums[0]}
+        return learner, buffer, plays, total, {**floats(jax.device_get(losses)), "clock": clock}, spent
 
 
 class ManyDevices:

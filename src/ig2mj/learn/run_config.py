@@ -32,6 +32,7 @@ from ig2mj.learn.settings import configure_all, written
 from ig2mj.learn.shipped import CHECKOUT, INSTALLED, find_policy
 from ig2mj.scene.scene import check_looks
 from ig2mj.sensors.base import CAMERA_LOOKS
+from ig2mj.worlds.randomize import Randomize
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,6 +74,8 @@ class RunSettings:
       augment_starts: train on this many start states made of those: every object lies where it does in one, turned as
         in another; 0: on those themselves.
       relaxed_thresholds: the success thresholds of the paper's experiments.
+      homes: "train", or names of homes with commas: worlds are shared out over them; "": the task's own.
+      randomize: axes of `ig2mj.Randomize` with commas, or "all"; "": nothing differs between episodes.
       expert: for SAC: the task's scripted expert begins episodes and labels states.
       save_buffer: checkpoints hold the replay buffer; without it a resumed run first refills it.
       programs: compiled programs of an iteration: 1, or 2 to time simulation and learning separately.
@@ -86,9 +89,23 @@ class RunSettings:
     pool_size: int = 0
     augment_starts: int = 0
     relaxed_thresholds: bool = False
+    homes: str = ""
+    randomize: str = ""
     expert: bool = False
     save_buffer: bool = False
     programs: int = 1
+
+    @property
+    def varied(self) -> dict[str, Any]:
+        """Options of `make` for `homes` and `randomize`. Raises UnknownNameError: no such axis."""
+        found: dict[str, Any] = {}
+        if self.homes:
+            names = self.homes.split(",")
+            found["homes"] = names[0] if names[0] in ("train", "held_out") else names
+        if self.randomize:
+            axes = Randomize.every() if self.randomize == "all" else Randomize.of(self.randomize.split(","))
+            found["randomize"] = axes
+        return found
 
     @property
     def rows(self) -> tuple[int, int] | None:

@@ -26,7 +26,7 @@ from ig2mj.cluster.team import Team
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.checkpoints import TAKEN, Checkpoints, newest, only_run, same, whole
 from ig2mj.learn.collect import TrainingEnv, horizon_of
-from ig2mj.learn.iteration import Algorithm, ManyDevices, OneDevice
+from ig2mj.learn.iteration import Algorithm, ManyDevices, OneDevice, SeveralHomes
 from ig2mj.learn.log import Log
 from ig2mj.learn.progress import EPISODES, Window
 from ig2mj.learn.settings import old_names_work
@@ -124,8 +124,15 @@ class _Training:
         self.depends = {**depends, "algorithm": algorithm.name, "settings": settings, "save_buffer": run.save_buffer}
         first_key, self.key = jax.random.split(jax.random.PRNGKey(run.seed))
         self.learner = jax.jit(algorithm.init)(first_key) if learner is None else learner
+        several = getattr(env, "envs", ())
+        if several and devices:
+            raise Ig2mjError("several homes are for one device (--devices 1)")
         self.step: Any = (
-            ManyDevices(env, algorithm, devices, team) if devices else OneDevice(env, algorithm, run.programs)
+            SeveralHomes(env, algorithm)
+            if several
+            else ManyDevices(env, algorithm, devices, team)
+            if devices
+            else OneDevice(env, algorithm, run.programs)
         )
         self.buffer = self.step.buffer()
         self.checkpoints = Checkpoints(run.out) if run.out is not None else None
