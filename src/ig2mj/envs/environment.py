@@ -249,9 +249,8 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         rows = np.asarray(rows)
         if rows.shape != (self.num_worlds,) or rows.min() < 0 or rows.max() >= size:
             raise EngineError(f"start_from takes {self.num_worlds} rows, each from 0 to {size - 1}")
-        starts = self.core.starts.bare_rows(rows)
         with GC_PAUSED:
-            return self._load(self.core.engine.reset(), as_seed(seed, self.num_worlds), starts, rows.astype(np.int32))
+            return self._load(self.core.engine.reset(), as_seed(seed, self.num_worlds), None, rows.astype(np.int32))
 
     def start_with(
         self, starts: Pool, draw: Draw | None = None, rows: Int[np.ndarray, "W"] | None = None, seed: Seed = 0
@@ -277,9 +276,10 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
             batch = dataclasses.replace(state.batch, draw=jax.tree.map(jnp.asarray, draw))
             return self._resume(batch, np.ones(self.num_worlds, bool), None, rows)
 
-    def _load_fn(self, physics: Physics, seed: Seeds, starts: Pool, rows: Int[Array, "W"]) -> EnvState:
-        batch = self.core.start_fn(physics, seed)
-        starts, draw = self.core.starts.drawn(starts, batch.world.key)
+    def _load_fn(self, physics: Physics, seed: Seeds, starts: Pool | None, rows: Int[Array, "W"]) -> EnvState:
+        batch, own = self.core.start_fn(physics, seed), self.core.starts
+        key = batch.world.key
+        starts, draw = own.rows(jnp.asarray(rows), key) if starts is None else own.drawn(starts, key)
         batch = dataclasses.replace(self.core.load_fn(batch, starts.physics, starts.states), draw=draw)
         return self._begun(batch, jnp.ones(self.num_worlds, bool), None, rows)
 

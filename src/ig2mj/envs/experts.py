@@ -18,8 +18,11 @@ from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
 from ig2mj.errors import UnknownNameError
 from ig2mj.process import entry_point
+from ig2mj.scene.scene import Scene
+from ig2mj.states.model import StateModel
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.experts import Expert
+from ig2mj.tasks.model_choices import VariedObjective
 from ig2mj.tasks.task import Task
 
 
@@ -30,7 +33,32 @@ def make_expert(env: Environment) -> Expert:
     if not isinstance(env.task, Task) or env.task.expert is None or rules is None:
         names = [name for name, task in ACTIVITIES.items() if task.expert is not None]
         raise UnknownNameError("task with an expert", env.task.name, names)
+    objective = getattr(env.objective, "base", env.objective)
+    if isinstance(objective, VariedObjective):
+        return VariedExpert(objective, env.robot, env.scene, rules.model, env.grasping)
     return Expert(env.task, env.robot, env.scene, rules.model, env.grasping)
+
+
+class VariedExpert(Expert):
+    """The expert of a task whose objects vary: in each world that of the models in use."""
+
+    def __init__(self, objective: VariedObjective, robot: str, scene: Scene, model: StateModel, grasping: str):
+        """As `Expert`."""
+        super().__init__(objective.tasks[0], robot, scene, model, grasping)
+        self._objective = objective
+        self._experts = [Expert(task, robot, scene, model, grasping) for task in objective.tasks]
+
+    def __call__(self, view: Any, states: Any, beliefs: Any = None) -> Float[Array, "W n"]:
+        """See `Expert`; beliefs are about the objects by the names of their parts."""
+        roles = self._objective.swaps
+        actions = []
+        for expert, names in zip(self._experts, roles.names, strict=True):
+            own = None
+            if beliefs:
+                taken = dict(zip(roles.roles, names, strict=True))
+                own = {taken.get(name, name): belief for name, belief in beliefs.items()}
+            actions.append(expert(view, states, own))
+        return self._objective.pick(view, actions)
 
 
 @entry_point

@@ -44,6 +44,7 @@ from ig2mj.tasks.custom.files import import_files, task_of_file
 from ig2mj.tasks.custom.objective import CustomObjective
 from ig2mj.tasks.homes import AnyTask, in_home
 from ig2mj.tasks.mixing import mixed_pool
+from ig2mj.tasks.model_choices import choices_of
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.objective import Objective
 from ig2mj.tasks.own_goal import goal_task, split_goal_name
@@ -310,6 +311,13 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     whole = config.whole_actions or (isinstance(task, Task) and task.whole_actions)
     control = Control(whole, config.period)
     split, pool_size = Split.of(config.split).starts, config.pool_size
+    choices, differs = None, config.randomize
+    if differs is not None:
+        differs.check_finished()
+        if (varied := differs.settings("objects")) is not None:
+            if not isinstance(task, Task) or task.code is not None:
+                raise EngineError(f"randomize: objects of {task.name}: only the paper's activities have several models")
+            choices = choices_of(task, Split.of(config.split).models, varied.count)
     if isinstance(task, NavigationTask):
         setup = setup_navigation(task, body, split, pool_size, control)
     elif isinstance(task, BddlTask):
@@ -318,6 +326,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         setup = setup_activity(
             *(task, body, mode, config.pool, split, pool_size, config.relaxed_thresholds, control),
             tried=lambda setup: _with_functions(setup, task, config, observations),
+            chosen=choices,
         )
     scene, rules, controllers = setup.scene, setup.rules, setup.controllers
     objective = _with_functions(setup, task, config, observations)
@@ -326,15 +335,20 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     starts = setup.pool()  # may take minutes: everything that has a name is known by now
     rows = starts.size
     if config.augment_starts and isinstance(task, Task):
+        if choices is not None:
+            raise EngineError(
+                "augment_starts and randomize: objects: augmented start states have the usual models only"
+            )
         starts = mixed_pool(task, scene, starts, config.augment_starts)
-    options, differs = config.engine_options, config.randomize
+    options = config.engine_options
     if differs is not None:
-        differs.check_finished()
         options = {**options, "model_fields": (*options.get("model_fields", ()), *differs.model_fields)}
     physics = make_engine(engine, scene, config.worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
     every_number = whole or isinstance(task, BddlTask)  # of the action; some ask hands back
-    core = Core(physics, rules, starts, controllers, hands, hand_resets=every_number, randomize=config.randomize)
+    core = Core(
+        physics, rules, starts, controllers, hands, hand_resets=every_number, randomize=differs, swaps=setup.swaps
+    )
     varied = () if differs is None else differs.axes
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], known, settings, varied=varied)
     observer = Observer(names, objective, perceived, None if differs is None else differs.settings("sensor_noise"))

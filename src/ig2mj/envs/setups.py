@@ -25,15 +25,17 @@ from ig2mj.tasks.bddl.objective import BddlObjective
 from ig2mj.tasks.bddl.task import BddlTask, activity_pool
 from ig2mj.tasks.custom.code import blamed
 from ig2mj.tasks.homes import AnyTask, check_inside
+from ig2mj.tasks.model_choices import ModelChoices, VariedObjective, widened
 from ig2mj.tasks.navigation.companions import wanderers
 from ig2mj.tasks.navigation.objective import NavigationObjective
 from ig2mj.tasks.navigation.reach_starts import make_reach_starts, standing_spot
 from ig2mj.tasks.navigation.starts import make_starts
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.objective import Objective
-from ig2mj.tasks.pools import pool_of, start_states
+from ig2mj.tasks.pools import bare_scene, pool_of, start_states
 from ig2mj.tasks.standing import standing_place
 from ig2mj.tasks.task import Task, place_robot, role_of
+from ig2mj.worlds.model_swaps import ModelSwaps
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.rules import Rules
 
@@ -69,7 +71,7 @@ class EnvSetup:
       scene: with its robots; the first is the one that acts. rules: with the task's goal, if it has one.
       pool: gives the start states, which may take minutes. controllers: of all robots. mittens: objects that mitten
         grasping holds. companions: see `Environment`. hands: numbers of the acting hands among all hands of the scene;
-        None: all of the first robot.
+        None: all of the first robot. swaps: objects whose models differ between episodes.
     """
 
     scene: Scene
@@ -81,6 +83,7 @@ class EnvSetup:
     mittens: tuple[str, ...] = ()
     companions: Companions | None = None
     hands: tuple[int, ...] | None = None
+    swaps: ModelSwaps | None = None
 
     @property
     def acting_hands(self) -> tuple[int, ...]:
@@ -126,12 +129,13 @@ def setup_activity(
     relaxed_thresholds: bool,
     control: Control,
     tried: Callable[[EnvSetup], object] = lambda setup: None,
+    chosen: ModelChoices | None = None,
 ) -> EnvSetup:
     """Of an activity.
 
     Args:
       count: rows of the pool. tried: called with a setup whose robot stands anywhere, before start states are sampled
-        to find where it stands. The others: of `ig2mj.make`.
+        to find where it stands. chosen: models of its objects, which differ. The others: of `ig2mj.make`.
     """
     name, body = find_robot(robot)
     role = role_of(task, name, body)
@@ -146,7 +150,7 @@ def setup_activity(
     def starts() -> Pool:
         return pool if pool is not None else pool_of(task, split, count)
 
-    setup = _placed_activity(task, robot, grasping, starts, relaxed_thresholds, control)
+    setup = _placed_activity(task, robot, grasping, starts, relaxed_thresholds, control, chosen)
     check_inside(task.name, setup.scene)
     return setup
 
@@ -169,8 +173,12 @@ def _placed_activity(
     starts: Callable[[], Pool],
     relaxed_thresholds: bool,
     control: Control,
+    chosen: ModelChoices | None = None,
 ) -> EnvSetup:
     """Of an activity that says where its robot starts. Arguments as of `setup_activity`; `starts`: gives its pool."""
+    base = task
+    if chosen is not None:
+        task = dataclasses.replace(chosen.task, robots=task.robots)
     name = find_robot(robot)[0]
     task, body = place_robot(task, robot, drives=control.whole)
     control = control.of(body)
@@ -179,11 +187,19 @@ def _placed_activity(
         rules = rules_of(task, scene, relaxed_thresholds)
     controller = control.controller(body, scene)
     with blamed(task.code, "distances"):
-        objective = ActivityObjective(task, name, scene, rules.model)
+        if chosen is None:
+            objective = ActivityObjective(task, name, scene, rules.model)
+        else:
+            own = dataclasses.replace(chosen, task=task)
+            objective = VariedObjective(own, name, scene, rules.model)
+    mittens = task.objects_of_interest[:1]
+    if chosen is not None and mittens and mittens[0] in chosen.roles:
+        at = chosen.roles.index(mittens[0])
+        mittens = tuple(dict.fromkeys(names[at] for names in chosen.names))
     return EnvSetup(
         scene,
         rules,
-        starts,
+        starts if chosen is None else lambda: widened(starts(), bare_scene(base), scene),
         (controller,),
         objective,
         control.actions(
@@ -196,8 +212,9 @@ def _placed_activity(
                 period=control.period,
             ),
         ),
-        task.objects_of_interest[:1],
+        mittens,
         hands=tuple(int(hand) for hand in objective.reward.hands),
+        swaps=objective.swaps if isinstance(objective, VariedObjective) else None,
     )
 
 

@@ -48,6 +48,7 @@ from ig2mj.worlds.controls import Controls
 from ig2mj.worlds.hand_resets import HandResets
 from ig2mj.worlds.hands import Hands, Held
 from ig2mj.worlds.incremental import rules_step
+from ig2mj.worlds.model_swaps import ModelSwaps
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds
 from ig2mj.worlds.randomize import Randomize
@@ -87,6 +88,7 @@ class Core:
         grasping: Grasping | None = None,
         hand_resets: bool = False,
         randomize: Randomize | None = None,
+        swaps: ModelSwaps | None = None,
     ):
         """Binds an engine to the rules of its scene.
 
@@ -99,6 +101,7 @@ class Core:
           hand_resets: hands that an action asks back are teleported where they are out of reach; makes compiled
             programs larger.
           randomize: what differs between episodes; the engine must have its `model_fields`.
+          swaps: objects whose models do.
         """
         self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
         self.grasping, self.hands = (
@@ -108,7 +111,7 @@ class Core:
         self.cameras = AgentCameras(engine, self.controllers)
         self.hand_resets = HandResets(engine, self.controllers, hand_resets)
         self.controls = Controls(engine, self.controllers)
-        self.starts = Starts(engine, rules.initial if rules is not None else None, pool, randomize)
+        self.starts = Starts(engine, rules.initial if rules is not None else None, pool, randomize, swaps)
         self.physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
         self._count = guards.counter(engine, lambda: self.starts.floor, engine.substeps * engine.timestep)
         self._select = engine.compile(select_worlds)

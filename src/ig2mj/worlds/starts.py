@@ -21,6 +21,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import ActionError, EngineError
 from ig2mj.worlds import guards
 from ig2mj.worlds.draw import Draw
+from ig2mj.worlds.model_swaps import ModelSwaps
 from ig2mj.worlds.plugin_states import completed
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds, episode_keys, pick_rows
@@ -31,9 +32,16 @@ from ig2mj.worlds.randomize import Randomize
 class Starts:
     """Rows to start from, and the floor below which an object has left the house. Made when they are first needed."""
 
-    def __init__(self, engine: Engine, initial: Any, pool: Pool | None, randomize: Randomize | None = None):
+    def __init__(
+        self,
+        engine: Engine,
+        initial: Any,
+        pool: Pool | None,
+        randomize: Randomize | None = None,
+        swaps: ModelSwaps | None = None,
+    ):
         """`initial`: states of one world, for where no pool is given: then all start where the engine's reset does.
-        `randomize`: what differs between episodes.
+        `randomize`: what differs between episodes. `swaps`: objects whose models do.
 
         Raises EngineError: the pool is of another scene, of other added objects, or of the scene before it was changed.
         """
@@ -46,7 +54,7 @@ class Starts:
             )
         self._engine, self._initial, self._given = engine, initial, pool
         self._draw = engine.compile(self._draw_fn)
-        self._randomize = randomize
+        self._randomize, self._swaps = randomize, swaps
         self._fields = engine.compile(lambda key: (self.randomization.fields(key), self.randomization.draw(key)))
 
     @functools.cached_property
@@ -67,7 +75,17 @@ class Starts:
 
     def rows(self, row: Int[Array, "W"], key: UInt[Array, "W 2"]) -> tuple[Pool, Draw]:
         """Rows of the pool, with the fields of the model that episodes with these keys have; and what else is drawn."""
-        return self.drawn(self.bare_rows(row), key)
+        rows, draw = self.drawn(self.bare_rows(row), key)
+        if self._swaps is None:
+            return rows, draw
+        choice = self._swaps.fitted(self._swaps.draw(key), row, self._fits)
+        return self._swaps.swapped(rows, choice), dataclasses.replace(draw, models=self._swaps.models(choice))
+
+    @functools.cached_property
+    def _fits(self) -> Bool[np.ndarray, "P K"]:
+        """Which models fit into which rows."""
+        assert self._swaps is not None
+        return self._swaps.fits(self._given if self._given is not None else self.pool)
 
     def bare_rows(self, row: Int[Array, "W"]) -> Pool:
         """Rows of the pool without fields of the model where episodes draw them."""
@@ -81,12 +99,19 @@ class Starts:
         if self._randomize is None:
             return rows, Draw()
         fields, draw = self._fields(key)
+        if self._swaps is not None:  # rows from elsewhere have the first choice, unless their draw says otherwise
+            draw = dataclasses.replace(draw, models=self._swaps.models(jnp.zeros(key.shape[0], jnp.int32)))
         fields = merged(fields, rows.physics.model_fields)
         return dataclasses.replace(rows, physics=dataclasses.replace(rows.physics, model_fields=fields)), draw
 
     def no_draw(self, worlds: int) -> Draw:
         """As `rows` gives it, before any episode."""
-        return Draw() if self._randomize is None else self._fields(jnp.zeros((worlds, 2), jnp.uint32))[1]
+        if self._randomize is None:
+            return Draw()
+        draw = self._fields(jnp.zeros((worlds, 2), jnp.uint32))[1]
+        if self._swaps is None:
+            return draw
+        return dataclasses.replace(draw, models=self._swaps.models(jnp.zeros(worlds, jnp.int32)))
 
     @functools.cached_property
     def floor(self) -> Float[np.ndarray, "O"]:

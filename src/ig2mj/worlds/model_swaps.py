@@ -1,0 +1,153 @@
+"""`ModelSwaps`: objects that change places with others of their category when an episode begins.
+
+A scene has every model that an object may have, the ones that are not used on a slab outside of the house, where they
+sleep and cost next to nothing. Rows of a pool have the object of the task in its place; an episode that draws another
+model puts that there, turned in the same way, on the same height and about the same middle, and the first on the slab.
+
+Axes: W worlds, P rows, K choices, R roles, O objects.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt
+
+from ig2mj.engine.layout import make_layout
+from ig2mj.engine.snapshot import FULLY_AWAKE
+from ig2mj.engine.view import Array
+from ig2mj.geometry.poses import quat_to_matrix
+from ig2mj.scene.scene import Scene
+from ig2mj.worlds.pool import Pool
+from ig2mj.worlds.randomization import stream
+
+CLEAR = 0.001
+"""m above its support at which another model is put down."""
+
+DEEP = 0.004
+"""m: a model that reaches deeper into something than this does not fit into a row."""
+
+
+class ModelSwaps:
+    """See the module's text. `draw` and `swapped` may be part of a compiled program.
+
+    Attributes:
+      roles: objects that rows of pools have in place. names: [K][R] objects that take their parts with each choice.
+    """
+
+    def __init__(self, scene: Scene, roles: Sequence[str], names: Sequence[Sequence[str]]):
+        """`roles`: objects that rows of pools have in place."""
+        self.scene, self.roles, self.names = scene, tuple(roles), [tuple(one) for one in names]
+        tables, layout = scene.tables, make_layout(scene.model, scene.tables)
+        self._base = np.array([scene.object_index(name) for name in roles])
+        self._other = np.array([[scene.object_index(name) for name in one] for one in names])
+        self._address, self._dof = layout.object_qposadr, layout.object_dofadr
+        self._trees, self._unit_object = layout.object_trees, layout.unit_object[: layout.num_object_units]
+        self._half, self._centre = 0.5 * tables.object_bbox, tables.object_bbox_center
+        self._away = np.asarray(scene.start_data().qpos, np.float32)
+        self._root = tables.object_root
+
+    def draw(self, key: UInt[Array, "W 2"]) -> Int[Array, "W"]:
+        """The choice of worlds whose episodes have these keys."""
+        count = len(self.names)
+        return jax.vmap(lambda k: jax.random.randint(k, (), 0, count))(stream(key, "models")).astype(jnp.int32)
+
+    def fitted(self, choice: Int[Array, "W"], row: Int[Array, "W"], fits: Bool[np.ndarray, "P K"]) -> Int[Array, "W"]:
+        """The first choice from the drawn one on that fits into each row; the drawn one where none does."""
+        count = len(self.names)
+        turns = (choice[:, None] + jnp.arange(count)) % count
+        good = jnp.take_along_axis(jnp.asarray(fits)[row], turns, axis=1)
+        return jnp.take_along_axis(turns, jnp.argmax(good, axis=1)[:, None], axis=1)[:, 0]
+
+    def swapped(self, rows: Pool, choice: Int[Array, "W"]) -> Pool:
+        """Rows in which the objects of the choices are in place."""
+        scene, states = rows.physics.scene, rows.states
+        qpos, asleep = jnp.asarray(scene.qpos), jnp.asarray(scene.tree_asleep)
+        touching = jnp.asarray(scene.touching)
+        order = jnp.broadcast_to(jnp.arange(len(self._root)), (qpos.shape[0], len(self._root)))
+        for r, base in enumerate(self._base):
+            other = jnp.asarray(self._other[:, r])[choice]
+            moved = other != base
+            at, to = self._columns(base), jnp.asarray(self._address)[other][:, None] + jnp.arange(7)
+            pose = qpos[:, at]
+            waits = jnp.take_along_axis(qpos, to, axis=1)
+            placed = self._placed(pose, jnp.full_like(other, base), other)
+            worlds = jnp.arange(qpos.shape[0])[:, None]
+            qpos = qpos.at[:, at].set(jnp.where(moved[:, None], self._waiting(int(base), waits), pose))
+            qpos = qpos.at[worlds, to].set(jnp.where(moved[:, None], placed, jnp.take_along_axis(qpos, to, axis=1)))
+            trees = (jnp.asarray(self._trees[base]) | jnp.asarray(self._trees)[other])[:, : asleep.shape[1]]
+            asleep = jnp.where(moved[:, None] & trees, FULLY_AWAKE, asleep)
+            units = (self._unit_object == base) | (self._unit_object == other[:, None])
+            touching &= ~(moved[:, None, None] & (units[:, :, None] | units[:, None, :]))
+            numbers = jnp.arange(order.shape[1])
+            order = jnp.where(moved[:, None] & (numbers == base), other[:, None], order)
+            order = jnp.where(moved[:, None] & (numbers == other[:, None]), base, order)
+
+        def permuted(array: Array) -> Array:
+            array = jnp.asarray(array)
+            if array.ndim < 2 or array.shape[1] != order.shape[1]:
+                return array
+            index = order.reshape(*order.shape, *(1,) * (array.ndim - 2))
+            return jnp.take_along_axis(array, index, axis=1)
+
+        scene = dataclasses.replace(scene, qpos=qpos, tree_asleep=asleep, touching=touching)
+        physics = dataclasses.replace(rows.physics, scene=scene)
+        return dataclasses.replace(rows, physics=physics, states=jax.tree.map(permuted, states))
+
+    def models(self, choice: Int[Array, "W"]) -> Int[Array, "W R"]:
+        """Objects that have the roles."""
+        return jnp.asarray(self._other, jnp.int32)[choice]
+
+    def active(self, object_pos: Float[Array, "W O 3"]) -> Int[Array, "W"]:
+        """The choice whose objects are farthest from where they wait: it is in use."""
+        first = self._other[:, 0]
+        waits = np.stack([self._away[self._columns(int(o))][:3] for o in first])
+        apart = jnp.sum(jnp.square(jnp.asarray(object_pos)[:, first] - waits), axis=-1)
+        return jnp.argmax(apart, axis=1)
+
+    def fits(self, pool: Pool) -> Bool[np.ndarray, "P K"]:
+        """Whether the objects of each choice go into each row without reaching into anything. On the host."""
+        model, data = self.scene.model, mujoco.MjData(self.scene.model)
+        owner = self.scene.tables.geom_object
+        found = np.ones((pool.size, len(self.names)), bool)
+        for k, objects in enumerate(self._other):
+            if (objects == self._base).all():
+                continue
+            with jax.ensure_compile_time_eval():  # also while a program is traced
+                rows = self.swapped(pool.rows(np.arange(pool.size)), jnp.full(pool.size, k))
+                qpos = np.asarray(rows.physics.scene.qpos)
+            for row in range(pool.size):
+                data.qpos[:] = self._away
+                data.qpos[: qpos.shape[1]] = qpos[row]
+                mujoco.mj_kinematics(model, data)
+                mujoco.mj_comPos(model, data)
+                mujoco.mj_collision(model, data)
+                contact = data.contact
+                mine = np.isin(owner[contact.geom], objects).any(1) if len(contact.dist) else np.zeros(0, bool)
+                found[row, k] = not (contact.dist[mine] < -DEEP).any()
+        return found
+
+    def _columns(self, number: int) -> np.ndarray:
+        return int(self._address[number]) + np.arange(7)
+
+    def _waiting(self, base: int, waits: Float[Array, "W 7"]) -> Float[Array, "W 7"]:
+        """The pose in which the object of the rows waits, where the other one did."""
+        own = jnp.asarray(self._away[self._columns(base)])
+        return jnp.broadcast_to(own, waits.shape)
+
+    def _placed(self, pose: Float[Array, "W 7"], base: Int[Array, "W"], other: Int[Array, "W"]) -> Float[Array, "W 7"]:
+        """The pose of another object in the place of one."""
+        turn = quat_to_matrix(pose[:, 3:])
+
+        def low(which: Array) -> Float[Array, "W 3"]:
+            middle = jnp.einsum("wij,wj->wi", turn, jnp.asarray(self._centre, jnp.float32)[which])
+            half = jnp.einsum("wij,wj->wi", jnp.abs(turn), jnp.asarray(self._half, jnp.float32)[which])
+            return middle.at[:, 2].add(-half[:, 2])
+
+        pos = pose[:, :3] + low(base) - low(other)
+        return jnp.concatenate([pos.at[:, 2].add(CLEAR), pose[:, 3:]], axis=1)
