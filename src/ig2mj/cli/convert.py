@@ -75,6 +75,7 @@ def convert_object(
     category: str,
     out: pathlib.Path,
     model: str | None = None,
+    split: str | None = None,
     bbox: tuple[float, float, float] | None = None,
     fixed: Flag = False,
     annotations: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
@@ -92,6 +93,7 @@ def convert_object(
       category: its category in iGibson's taxonomy (apple, fridge, ...), which decides its abilities.
       out: output folder; an earlier result there is replaced once the conversion succeeds.
       model: name of the object; default: the file's name.
+      split: the part of its category that it joins, train or held_out (docs/guide/randomization.md).
       fixed: it is furniture: in a home it stands where it is put for good, and nothing moves it.
       annotations: TOML file with its abilities, thresholds and functional parts, such as a button or a heat source
         (docs/guide/objects.md).
@@ -100,6 +102,11 @@ def convert_object(
       package_path: folders that hold the packages of `package://` names.
     """
     from ig2mj_converters.conversion import convert_object as convert
+
+    from ig2mj.scene.model_splits import check_part, join_split
+
+    if split is not None:
+        check_part(split)
 
     options = options_of(common, default_jobs=os.cpu_count() or 1, mesh_root=mesh_root, package_path=package_path)
     with _progress(f"converting {urdf.name}") as options_with:
@@ -113,6 +120,8 @@ def convert_object(
             annotations=annotations,
             options=options_with(options),
         )
+    if split is not None:
+        join_split(out, split)
     return _tell(outcome, out, "object.xml", common.json)
 
 

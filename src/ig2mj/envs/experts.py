@@ -8,7 +8,7 @@ Pure: it may be part of a compiled program, and asked in any state (`ig2mj.tasks
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax
@@ -22,6 +22,7 @@ from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.experts import Expert
+from ig2mj.tasks.experts.sight import Belief
 from ig2mj.tasks.model_choices import VariedObjective
 from ig2mj.tasks.task import Task
 
@@ -48,15 +49,12 @@ class VariedExpert(Expert):
         self._objective = objective
         self._experts = [Expert(task, robot, scene, model, grasping) for task in objective.tasks]
 
-    def __call__(self, view: Any, states: Any, beliefs: Any = None) -> Float[Array, "W n"]:
+    def __call__(self, view: Any, states: Any, beliefs: Mapping[str, Belief] | None = None) -> Float[Array, "W n"]:
         """See `Expert`; beliefs are about the objects by the names of their parts."""
-        roles = self._objective.swaps
-        actions = []
-        for expert, names in zip(self._experts, roles.names, strict=True):
-            own = None
-            if beliefs:
-                taken = dict(zip(roles.roles, names, strict=True))
-                own = {taken.get(name, name): belief for name, belief in beliefs.items()}
+        swaps, actions = self._objective.swaps, []
+        for expert, names in zip(self._experts, swaps.names, strict=True):
+            taken: dict[str, str] = dict(zip(swaps.roles, names, strict=True))
+            own: dict[str, Belief] = {taken.get(name, name): belief for name, belief in (beliefs or {}).items()}
             actions.append(expert(view, states, own))
         return self._objective.pick(view, actions)
 

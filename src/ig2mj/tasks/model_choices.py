@@ -31,6 +31,7 @@ from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.additions import name_additions
 from ig2mj.scene.library import LibraryName, find_model, library
 from ig2mj.scene.manifest import load_manifest
+from ig2mj.scene.model_splits import models_with_parts
 from ig2mj.scene.paths import scene_folder
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.states.initial import initial_states
@@ -91,9 +92,9 @@ def choices_of(task: Task, part: str, count: int) -> ModelChoices:
     added: list[Any] = []
     for role, model in roles.items():
         category = role.rsplit("_", 1)[0] if model is None else model.category
-        pool = list(library().get(category, ()))
+        pool, joined = models_with_parts(category)
         own = None if model is None else model.model
-        for name in models_of(pool, part)[:count]:
+        for name in _most(models_of(pool, part, joined), joined, count):
             if name == own:
                 found.setdefault(role, []).append((role, name))
                 continue
@@ -115,6 +116,18 @@ def choices_of(task: Task, part: str, count: int) -> ModelChoices:
         tuple(tuple(name for name, _ in one) for one in sets),
         tuple(tuple(model for _, model in one) for one in sets),
     )
+
+
+def _renamed(task: Task, names: Mapping[str, str]) -> Task:
+    """The task in which other objects have these parts."""
+    at_home = {here: name for name, here in task.roles.items()}
+    own = {at_home.get(role, role): name for role, name in names.items()}
+    return dataclasses.replace(with_names(task, names), roles={**task.roles, **own})
+
+
+def _most(models: list[str], joined: Mapping[str, str], count: int) -> list[str]:
+    """So many models, those that the user put into the part among them first."""
+    return [*(m for m in models if m in joined), *(m for m in models if m not in joined)][:count]
 
 
 ATOM = re.compile(r"\([\w?.-]+(?: [\w?.-]+)*\)")

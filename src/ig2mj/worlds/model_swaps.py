@@ -73,12 +73,12 @@ class ModelSwaps:
         for r, base in enumerate(self._base):
             other = jnp.asarray(self._other[:, r])[choice]
             moved = other != base
-            at, to = self._columns(base), jnp.asarray(self._address)[other][:, None] + jnp.arange(7)
+            at, to = self._columns(int(base)), jnp.asarray(self._address)[other][:, None] + jnp.arange(7)
             pose = qpos[:, at]
             waits = jnp.take_along_axis(qpos, to, axis=1)
             placed = self._placed(pose, jnp.full_like(other, base), other)
             worlds = jnp.arange(qpos.shape[0])[:, None]
-            qpos = qpos.at[:, at].set(jnp.where(moved[:, None], self._waiting(int(base), waits), pose))
+            qpos = qpos.at[:, at].set(jnp.where(moved[:, None], waits, pose))
             qpos = qpos.at[worlds, to].set(jnp.where(moved[:, None], placed, jnp.take_along_axis(qpos, to, axis=1)))
             trees = (jnp.asarray(self._trees[base]) | jnp.asarray(self._trees)[other])[:, : asleep.shape[1]]
             asleep = jnp.where(moved[:, None] & trees, FULLY_AWAKE, asleep)
@@ -113,13 +113,13 @@ class ModelSwaps:
     def fits(self, pool: Pool) -> Bool[np.ndarray, "P K"]:
         """Whether the objects of each choice go into each row without reaching into anything. On the host."""
         model, data = self.scene.model, mujoco.MjData(self.scene.model)
-        owner = self.scene.tables.geom_object
+        owner, swapped = self.scene.tables.geom_object, jax.jit(self.swapped)
         found = np.ones((pool.size, len(self.names)), bool)
         for k, objects in enumerate(self._other):
             if (objects == self._base).all():
                 continue
             with jax.ensure_compile_time_eval():  # also while a program is traced
-                rows = self.swapped(pool.rows(np.arange(pool.size)), jnp.full(pool.size, k))
+                rows = swapped(pool.rows(np.arange(pool.size)), jnp.full(pool.size, k))
                 qpos = np.asarray(rows.physics.scene.qpos)
             for row in range(pool.size):
                 data.qpos[:] = self._away
@@ -135,11 +135,6 @@ class ModelSwaps:
     def _columns(self, number: int) -> np.ndarray:
         return int(self._address[number]) + np.arange(7)
 
-    def _waiting(self, base: int, waits: Float[Array, "W 7"]) -> Float[Array, "W 7"]:
-        """The pose in which the object of the rows waits, where the other one did."""
-        own = jnp.asarray(self._away[self._columns(base)])
-        return jnp.broadcast_to(own, waits.shape)
-
     def _placed(self, pose: Float[Array, "W 7"], base: Int[Array, "W"], other: Int[Array, "W"]) -> Float[Array, "W 7"]:
         """The pose of another object in the place of one."""
         turn = quat_to_matrix(pose[:, 3:])
@@ -147,7 +142,7 @@ class ModelSwaps:
         def low(which: Array) -> Float[Array, "W 3"]:
             middle = jnp.einsum("wij,wj->wi", turn, jnp.asarray(self._centre, jnp.float32)[which])
             half = jnp.einsum("wij,wj->wi", jnp.abs(turn), jnp.asarray(self._half, jnp.float32)[which])
-            return middle.at[:, 2].add(-half[:, 2])
+            return jnp.asarray(middle).at[:, 2].add(-half[:, 2])
 
         pos = pose[:, :3] + low(base) - low(other)
-        return jnp.concatenate([pos.at[:, 2].add(CLEAR), pose[:, 3:]], axis=1)
+        return jnp.concatenate([pos + np.array([0, 0, CLEAR], np.float32), pose[:, 3:]], axis=1)

@@ -22,6 +22,7 @@ from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import TURN_SPEED
 from ig2mj.tasks.experts.motion import HandMotion
 from ig2mj.tasks.experts.quarters import quarter_turn, turned_view
+from ig2mj.tasks.experts.roles import with_roles
 from ig2mj.tasks.experts.sight import Belief, ExpertView
 from ig2mj.tasks.task import Task, role_of
 
@@ -48,7 +49,9 @@ class Expert:
         if task.expert is None:
             raise EngineError(f"{task.name} has no expert: give its Task one (`expert=`)")
         self.task, self.robot, self.grasping = task, robot, grasping
-        self._plan, self._scene, self._model = task.expert, scene, model
+        self._plan, self._scene, self._model = task.expert, with_roles(scene, task.roles), model
+        at_home = {here: name for name, here in task.roles.items()}
+        self._objects = tuple(at_home.get(name, name) for name in task.objects_of_interest)
         own = np.flatnonzero(scene.tables.hand_agent == 0)
         body = scene.agents[0]
         if not isinstance(body, TaskRobot) or not body.hand_controls:
@@ -78,15 +81,19 @@ class Expert:
             model=self._model,
             hands=self._hands,
             controls=self._controls,
-            objects=self.task.objects_of_interest,
+            objects=self._objects,
             grips=self._grips,
             grasping=self.grasping,
-            beliefs={name: _of_the_world(base, belief) for name, belief in (beliefs or {}).items()},
+            beliefs={self._at_home(n): _of_the_world(base, belief) for n, belief in (beliefs or {}).items()},
         )
         return jnp.concatenate(
             [self._action(base, motion, hand) for motion, hand in zip(self._plan(see), self._controls, strict=True)],
             axis=1,
         )
+
+    def _at_home(self, name: str) -> str:
+        """The name that an object has in the task's own home."""
+        return next((own for own, here in self.task.roles.items() if here == name), name)
 
     def _action(self, base: Float[Array, "W 4"], motion: HandMotion, hand: HandControl) -> Float[Array, "W k"]:
         """Of one hand: in the base's frame, slowed down evenly where a number would be beyond 1."""
