@@ -30,7 +30,8 @@ from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, activity_name, short_name, unknown_environment
 from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, EnvSetup, setup_activity, setup_bddl, setup_navigation
-from ig2mj.envs.several_homes import HomesEnvironment
+from ig2mj.envs.several_homes import HomesEnvironment, requested_homes
+from ig2mj.envs.start_choices import augmented, start_part, varied_models
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.sensors.registry import SENSORS
@@ -43,16 +44,11 @@ from ig2mj.tasks.custom.definition import Definition, task_of
 from ig2mj.tasks.custom.files import import_files, task_of_file
 from ig2mj.tasks.custom.objective import CustomObjective
 from ig2mj.tasks.homes import AnyTask, in_home
-from ig2mj.tasks.mixing import mixed_pool
-from ig2mj.tasks.model_choices import choices_of
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.objective import Objective
 from ig2mj.tasks.own_goal import goal_task, split_goal_name
-from ig2mj.tasks.pools import check_pool
 from ig2mj.tasks.registry import REGISTERED, load_task, split_reference
 from ig2mj.tasks.registry import TASKS as TASK_NAMES
-from ig2mj.tasks.relocation import reason_against
-from ig2mj.tasks.splits import HELD_OUT_HOMES, TRAIN_HOMES, Split
 from ig2mj.tasks.task import Task
 from ig2mj.tasks.variants import variant as task_variant
 from ig2mj.worlds.core import Core
@@ -199,40 +195,8 @@ def make(
     else:
         chosen = EnvConfig().override(robot=config)
     chosen = chosen.override(config_overrides, **overrides)
-    requested = _homes(task, chosen, homes)
+    requested = requested_homes(task, chosen, homes)
     return _make(task, chosen) if requested is None else _make_several(task, chosen, requested)
-
-
-def _homes(task: AnyTask, config: EnvConfig, homes: Any) -> tuple[str, ...] | None:
-    """Several homes that are asked for; None: one. Raises UnknownNameError, EngineError: these cannot be."""
-    split = Split.of(config.split)
-    if homes is not None and config.home is not None:
-        raise EngineError("home= and homes=: give one of them")
-    if config.home is not None and not isinstance(config.home, str | os.PathLike):
-        for home in config.home:
-            split.check_home(home)
-        return tuple(os.fspath(home) for home in config.home)
-    split.check_home(config.home)
-    if homes is None and (split.homes == "train" or config.home is not None):
-        return None
-    part = split.homes if homes is None else homes
-    if not isinstance(part, str):
-        return _homes(task, dataclasses.replace(config, home=part), None)
-    if part not in HOMES:
-        raise UnknownNameError("set of homes", str(part), HOMES)
-    if part == "train" and split.homes == "held_out":
-        raise EngineError(f"homes='train' and split='{split.name}': this split takes held-out homes")
-    if not isinstance(task, Task):
-        return HOMES[part]
-    fitting = tuple(home for home in HOMES[part] if not reason_against(task, home))
-    if not fitting:
-        reasons = "; ".join(reason_against(task, home) for home in HOMES[part])
-        raise EngineError(f"{task.name} fits into none of the homes {', '.join(HOMES[part])}: {reasons}")
-    return fitting
-
-
-HOMES = {"train": TRAIN_HOMES, "held_out": HELD_OUT_HOMES}
-"""Sets of homes by name."""
 
 
 def _make_several(task: AnyTask, config: EnvConfig, homes: tuple[str, ...]) -> HomesEnvironment:
@@ -301,8 +265,6 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
             whole_number(argument, given)
     settings = config.sensor_options()
     whole_number("augment_starts", config.augment_starts, least=0)
-    if config.pool is not None and isinstance(task, Task):
-        check_pool(task, config.pool)
     if config.augment_starts and not isinstance(task, Task):
         raise EngineError(f"augment_starts for {task.name}: only start states of the paper's activities are augmented")
     engine = choose_engine(config.engine)
@@ -310,14 +272,9 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     task = dataclasses.replace(task, horizon=_horizon(task, config))
     whole = config.whole_actions or (isinstance(task, Task) and task.whole_actions)
     control = Control(whole, config.period)
-    split, pool_size = Split.of(config.split).starts, config.pool_size
-    choices, differs = None, config.randomize
-    if differs is not None:
-        differs.check_finished()
-        if (varied := differs.settings("objects")) is not None:
-            if not isinstance(task, Task) or task.code is not None:
-                raise EngineError(f"randomize: objects of {task.name}: only the paper's activities have several models")
-            choices = choices_of(task, Split.of(config.split).models, varied.count)
+    split, pool_size = start_part(config.split), config.pool_size
+    differs = config.randomize
+    choices = None if differs is None else varied_models(task, differs, config.split)
     if isinstance(task, NavigationTask):
         setup = setup_navigation(task, body, split, pool_size, control)
     elif isinstance(task, BddlTask):
@@ -335,11 +292,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     starts = setup.pool()  # may take minutes: everything that has a name is known by now
     rows = starts.size
     if config.augment_starts and isinstance(task, Task):
-        if choices is not None:
-            raise EngineError(
-                "augment_starts and randomize: objects: augmented start states have the usual models only"
-            )
-        starts = mixed_pool(task, scene, starts, config.augment_starts)
+        starts = augmented(task, setup, starts, config.augment_starts)
     options = config.engine_options
     if differs is not None:
         options = {**options, "model_fields": (*options.get("model_fields", ()), *differs.model_fields)}

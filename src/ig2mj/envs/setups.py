@@ -32,7 +32,7 @@ from ig2mj.tasks.navigation.reach_starts import make_reach_starts, standing_spot
 from ig2mj.tasks.navigation.starts import make_starts
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.objective import Objective
-from ig2mj.tasks.pools import bare_scene, pool_of, start_states
+from ig2mj.tasks.pools import bare_scene, check_pool, pool_of, start_states
 from ig2mj.tasks.standing import standing_place
 from ig2mj.tasks.task import Task, place_robot, role_of
 from ig2mj.worlds.model_swaps import ModelSwaps
@@ -137,6 +137,8 @@ def setup_activity(
       count: rows of the pool. tried: called with a setup whose robot stands anywhere, before start states are sampled
         to find where it stands. chosen: models of its objects, which differ. The others: of `ig2mj.make`.
     """
+    if pool is not None:
+        check_pool(task, pool)
     name, body = find_robot(robot)
     role = role_of(task, name, body)
     if role.pos is None:

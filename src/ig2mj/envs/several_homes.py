@@ -12,7 +12,9 @@ Axes: W worlds, H homes.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
+import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -23,16 +25,22 @@ from flax import struct
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
+from ig2mj.envs.config import EnvConfig
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.state import EnvState, metrics_of
-from ig2mj.errors import ActionError, EngineError
+from ig2mj.errors import ActionError, EngineError, UnknownNameError
 from ig2mj.process import entry_point
-from ig2mj.tasks.relocation import renamed
+from ig2mj.tasks.homes import AnyTask
+from ig2mj.tasks.relocation import reason_against, renamed
+from ig2mj.tasks.splits import HELD_OUT_HOMES, TRAIN_HOMES, Split
 from ig2mj.tasks.task import Task
 from ig2mj.worlds.random_streams import LARGEST
 
 STRIDE = 104_729
 """Between the seeds of two homes, so that their worlds draw differently."""
+
+HOMES = {"train": TRAIN_HOMES, "held_out": HELD_OUT_HOMES}
+"""Sets of homes by name."""
 
 
 @struct.dataclass
@@ -185,3 +193,31 @@ def _in_role(name: str, own: dict[str, str]) -> str:
         if name.startswith(f"{here}_"):
             return renamed(here, {here: at_home}) + name[len(here) :]
     return name
+
+
+def requested_homes(task: AnyTask, config: EnvConfig, homes: Any) -> tuple[str, ...] | None:
+    """Several homes that are asked for; None: one. Raises UnknownNameError, EngineError: these cannot be."""
+    split = Split.of(config.split)
+    if homes is not None and config.home is not None:
+        raise EngineError("home= and homes=: give one of them")
+    if config.home is not None and not isinstance(config.home, str | os.PathLike):
+        for home in config.home:
+            split.check_home(home)
+        return tuple(os.fspath(home) for home in config.home)
+    split.check_home(config.home)
+    if homes is None and (split.homes == "train" or config.home is not None):
+        return None
+    part = split.homes if homes is None else homes
+    if not isinstance(part, str):
+        return requested_homes(task, dataclasses.replace(config, home=part), None)
+    if part not in HOMES:
+        raise UnknownNameError("set of homes", str(part), HOMES)
+    if part == "train" and split.homes == "held_out":
+        raise EngineError(f"homes='train' and split='{split.name}': this split takes held-out homes")
+    if not isinstance(task, Task):
+        return HOMES[part]
+    fitting = tuple(home for home in HOMES[part] if not reason_against(task, home))
+    if not fitting:
+        reasons = "; ".join(reason_against(task, home) for home in HOMES[part])
+        raise EngineError(f"{task.name} fits into none of the homes {', '.join(HOMES[part])}: {reasons}")
+    return fitting
