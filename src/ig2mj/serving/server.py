@@ -21,7 +21,7 @@ from ig2mj.install_hint import require_extras
 from ig2mj.learn.evaluate import draws
 from ig2mj.learn.policies import Policy, perception_of
 from ig2mj.serving import messages
-from ig2mj.serving.observations import BEGINS, WORLD, openpi_name
+from ig2mj.serving.observations import BEGINS, PREFIX, WORLD, openpi_name
 
 HOST, PORT = "127.0.0.1", 8000
 
@@ -55,6 +55,10 @@ class ServedPolicy:
             "grasping": depends["grasping"],
             "relaxed_thresholds": bool(policy.card.get("paper_rl", False)),
             "observations": list(policy.observations),
+            "example": {
+                openpi_name(name).removeprefix(PREFIX): np.zeros(space.shape, space.dtype)
+                for name, space in self._spaces.items()
+            },
             "action_names": list(env.action_names),
         }
 
