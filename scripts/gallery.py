@@ -28,7 +28,14 @@ TILE, QUALITY = (400, 300), 84
 
 
 def main() -> None:
-    parts = {"rooms": rooms, "homes": homes, "robots": robots, "states": states, "night": night}
+    parts = {
+        "rooms": rooms,
+        "homes": homes,
+        "robots": robots,
+        "states": states,
+        "substances": substances,
+        "night": night,
+    }
     for name in sys.argv[1:] or parts:
         parts[name]()
         print(name, flush=True)
@@ -146,6 +153,25 @@ def states() -> None:
         del sim
     small = [Image.fromarray(t).resize((300, 225), Image.Resampling.LANCZOS) for t in tiles]
     sheet([np.asarray(image) for image in small], 4).save(FOLDER / "gallery_states.jpg", quality=QUALITY)
+
+
+def substances() -> None:
+    """Milk in a bowl, and a table with mud on which a newspaper burns."""
+    names = ["water", "milk", "mud"]
+    sim = ig2mj.Simulation(load_scene("birch", objects=["newspaper", "with:on_fire"], substances=names))
+    for condition in (
+        ("on_top", "newspaper_0", "coffee_table_0"),
+        ("filled", "bowl_0", "milk"),
+        ("covered", "coffee_table_0", "mud"),
+        ("on_fire", "newspaper_0"),
+    ):
+        sim.set_predicate(*condition)
+    tiles = []
+    for name, distance, elevation in (("bowl_0", 0.6, -40.0), ("newspaper_0", 1.2, -20.0)):
+        at = np.asarray(sim.view.object_com)[0, sim.scene.object_index(name)]
+        view = FreeView((float(at[0]), float(at[1]), float(at[2])), distance, 120.0, elevation)
+        tiles.append(sim.render(view, width=480, height=360))
+    sheet(tiles, 2).save(FOLDER / "gallery_substances.jpg", quality=QUALITY)
 
 
 def into_room(sim: ig2mj.Simulation, index: int) -> np.ndarray:
