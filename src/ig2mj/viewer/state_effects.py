@@ -71,7 +71,7 @@ def effects(
             found += _on_surface(low[k], high[k], DROPS, (*WATER_COLOUR, 0.75), k, frost=False)
         elif state == "toggled_on" and any(word in tables.object_categories[k] for word in LIGHTS):
             top = np.array([*(low[k] + high[k])[:2] / 2, high[k][2] - 0.1])
-            for radius in (0.14, 0.24, 0.36):
+            for radius in (0.05, 0.09, 0.14):
                 found.append(Mark(mujoco.mjtGeom.mjGEOM_SPHERE, (radius,) * 3, top, np.eye(3), GLOW))
     return found + substance_marks(model, states, view, world, time)
 
