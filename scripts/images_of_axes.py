@@ -20,7 +20,7 @@ from ig2mj.sensors.noise import noisy
 from ig2mj.worlds.draw import Draw
 from ig2mj.worlds.randomize import Materials, SensorNoise
 
-WORLDS, SIDE, SEED = 5, 192, 3
+WORLDS, SIDE, SEED = 5, 192, 4
 """Images of each axis, pixels of each, and the seed."""
 
 
@@ -53,7 +53,8 @@ def main(folder: pathlib.Path) -> None:
         Image.fromarray(np.concatenate(parts, axis=1)).save(folder / f"randomization_{axis}.jpg", quality=88)
 
     batch = coloured(batch, plain)
-    save("objects", shot(batch, Draw()))
+    none = jnp.zeros((WORLDS, 3)), jnp.tile(jnp.array([1.0, 0.0, 0.0, 0.0]), (WORLDS, 1))
+    save("objects", shot(batch, Draw(camera_pos=none[0], camera_quat=none[1], camera_slope=jnp.full(WORLDS, 0.25))))
     first = core.engine.export(batch.world.physics, 0)
     states = jax.tree.map(lambda a: np.repeat(np.asarray(a)[:1], WORLDS, 0), batch.world.states)
     batch = core.load(batch, first, states)
