@@ -44,7 +44,7 @@ KINDS: dict[type, str] = {
 NAMES = ("name", "summary", "home")
 """Fields that name or describe."""
 
-ELSEWHERE = ("objects", "added", "horizon", "grasping", "physical", "expert", "start", "near", "flat", "upright")
+ELSEWHERE = ("objects", "added", "horizon", "grasping", "physical", "expert", "start", "near", "flat", "upright", "fit")
 """Fields of a task that a recording has elsewhere: added objects are part of the scene's hash, what differs with
 physical grasping is in the task that `variant` makes of it, and of the sampled start states it has its own."""
 
