@@ -16,6 +16,7 @@ from ig2mj.tasks import points
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.bddl.task import bddl_task
 from ig2mj.tasks.registry import load_task
+from ig2mj.tasks.task import Fit
 
 MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
@@ -105,6 +106,8 @@ def test_the_hash_of_a_task_is_of_its_values_and_not_of_names_of_classes(monkeyp
     same = Errand(**{f.name: getattr(task, f.name) for f in dataclasses.fields(task)})
     assert task_hash(same, "humanoid") == before, "another class, with a field more that has its default"
     assert task_hash(dataclasses.replace(task, name="Frying", summary="Fry.", home="oak"), "humanoid") == before
+    fitted = dataclasses.replace(task, fit=Fit("table_0", ("desk",)))
+    assert task_hash(fitted, "humanoid") == before, "what it needs of other homes"
     assert (
         task_hash(dataclasses.replace(task, robots={**task.robots, "own": task.robots["fetch"]}), "humanoid") == before
     )
