@@ -16,6 +16,12 @@ from ig2mj.scene.scene import Scene
 NEAR = (-0.006, 0.0, 0.006)
 """m round the grasp point at which the opening of a hand is measured, along its approach and across it."""
 
+FREE_JOINTS = 6
+"""Joints with which an arm can bring its hand to any position in any orientation."""
+
+WEIGHT, WEIGHT_FEW = 0.3, 0.03
+"""m/rad: of the orientation next to the position in inverse kinematics, with that many joints and with fewer."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Hand:
@@ -67,7 +73,7 @@ class Arm:
         self, q: np.ndarray, point: np.ndarray, approach: np.ndarray, across: np.ndarray | None, steps: int = 100
     ) -> tuple[np.ndarray, float, float]:
         """Posture near q that brings the hand there, and its errors: m and rad (of the approach)."""
-        weight = 0.3
+        weight = WEIGHT if len(q) >= FREE_JOINTS else WEIGHT_FEW
         for _ in range(steps):
             at, along, side = self.put(q)
             moves, turns = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))

@@ -18,7 +18,7 @@ import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.urdf import UrdfRobot
-from ig2mj.calibration.robot_hand import Arm, Hand, hand_of
+from ig2mj.calibration.robot_hand import FREE_JOINTS, Arm, Hand, hand_of
 from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.simulation import Simulation
@@ -70,6 +70,10 @@ APPROACHES = {"from above": (0.0, -1.0), "obliquely": (math.sqrt(0.5), -math.sqr
 ALIGNED = math.cos(math.radians(45))
 """Cosine to an approach of postures that count for it."""
 
+OFF, OFF_FEW = 0.1, 0.5
+"""rad between a hand's direction and its approach, of arms with six joints or more and with fewer; the latter then
+approach along the direction that their hand has."""
+
 FEWEST, PLACES, NEAREST = 3, 12, 30
 """Postures with which an approach is tried; places tried for each; postures tried at each place."""
 
@@ -111,9 +115,10 @@ def lift(
     edge = fits[-1]
     bare = Arm(load_scene(home, agents=[robot]), robot, hand)
     for name, point, approach, postures in _places(bare, rng, robot):
-        found = _grasp(bare, point, approach, postures)
-        if found is None:
+        held = _grasp(bare, point, approach, postures)
+        if held is None:
             continue
+        found, approach = held[:2], held[2]
         height = round(float(point[2]) - edge / 2, 3)
         width = POST if name == "from above" else edge
         cube, post = prop(edge, edge), prop(width, height)
@@ -190,26 +195,29 @@ def _touched(simulation: Simulation, cube: str) -> bool:
 
 def _grasp(
     arm: Arm, point: np.ndarray, approach: np.ndarray, postures: list[np.ndarray]
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Postures that hold at a point, and `HOVER` before it; None where neither is reached without touching anything, or
-    the hand cannot go up from there."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Postures that hold at a point, and `HOVER` before it, and the direction from the latter to the former; None where
+    neither is reached without touching anything, or the hand cannot go up from there."""
+    few = len(postures[0]) < FREE_JOINTS
+    requested = approach
     for q in postures:
-        q, off, turned = arm.solve(q, point, approach, None)
-        _, _, side = arm.put(q)
-        if off > 0.004 or turned > 0.1 or abs(side[2]) > 0.2 or arm.collides():
+        q, off, turned = arm.solve(q, point, requested, None)
+        _, along, side = arm.put(q)
+        if off > 0.004 or turned > (OFF_FEW if few else OFF) or abs(side[2]) > 0.2 or arm.collides():
             continue
+        approach = along.copy() if few else requested
         hover, off, _ = arm.solve(q, point - HOVER * approach, approach, _kept(side, q))
         arm.put(hover)
         if off > 0.01 or arm.collides() or np.abs(hover - q).max() > MOST_BEND:
             continue
         if arm.solve(q, point + RAISE, approach, _kept(side, q))[1] < 0.01:
-            return q, hover
+            return q, hover, approach
     return None
 
 
 def _kept(side: np.ndarray, q: np.ndarray) -> np.ndarray | None:
     """The finger axis that postures near q are to keep; None: the arm has too few joints to choose it."""
-    return side.copy() if len(q) >= 6 else None
+    return side.copy() if len(q) >= FREE_JOINTS else None
 
 
 def _in_the_way(arm: Arm, grasp: np.ndarray, hover: np.ndarray) -> bool:

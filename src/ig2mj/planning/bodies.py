@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.agents.base import Controller
-from ig2mj.agents.humanoid.frames import HAND_POS, HAND_QUAT, HAND_REACH, SHOULDER_POS
+from ig2mj.agents.humanoid.frames import BODY_HEIGHT, HAND_POS, HAND_QUAT, HAND_REACH, SHOULDER_POS
+from ig2mj.agents.humanoid.robot import BODY_RADIUS
 from ig2mj.agents.task_robot import HandControl, TaskRobot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.host_rotations import (
@@ -28,7 +29,8 @@ from ig2mj.geometry.host_rotations import (
     quat_rotate_inverse,
     quat_to_rotation_vector,
 )
-from ig2mj.planning.phases import Base
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.phases import Base, Phase
 from ig2mj.planning.steps import PlanningError
 from ig2mj.scene.scene import Scene
 
@@ -45,6 +47,10 @@ GAIN, MOST = 1.2, 0.5
 """Of a wheeled base: command of its turning for each rad (1 is its greatest speed), and the greatest command of turning
 and driving."""
 
+RADIUS, CORNER, BEHIND, ALONG = 0.03, 0.03, 0.014, (0.07, 0.1)
+"""m: of the spheres of a floating hand: radius; of the palm's corners from its middle, along the fingers and across; of
+the palm behind the grasp point; of the fingers ahead of it."""
+
 _BODY = tuple(f"body_{n}" for n in ("x", "y", "z", "roll", "pitch", "yaw"))
 
 UPRIGHT = 0.5
@@ -53,7 +59,7 @@ UPRIGHT = 0.5
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Senses:
-    """What executing a program reads of the view; world frame, m, w-x-y-z."""
+    """What executing a program reads of the view; world frame, m, w-x-y-z. joints: of all robots, rad or m."""
 
     base_pos: Float[np.ndarray, "W 3"]
     base_quat: Float[np.ndarray, "W 4"]
@@ -61,6 +67,7 @@ class Senses:
     hand_quat: Float[np.ndarray, "W H 4"]
     held: Bool[np.ndarray, "W H O"]
     touching: Bool[np.ndarray, "W O"]
+    joints: Float[np.ndarray, "W J"] | None = None
 
     @property
     def yaw(self) -> Float[np.ndarray, "W"]:
@@ -79,6 +86,7 @@ def sense(view: PhysicsView, agent: int, hands: Int[np.ndarray, "H"]) -> Senses:
         hand_quat=np.asarray(a.hand_quat)[:, hands],
         held=np.asarray(view.held)[:, hands],
         touching=np.asarray(a.touching)[:, agent],
+        joints=np.asarray(a.joint_pos),
     )
 
 
@@ -119,8 +127,86 @@ def body_of(scene: Scene, controller: Controller, agent: int = 0) -> Body:
     if "body_x" in names:
         return HoveringBody(scene, controller, agent)
     if {"forward", "turn_left"} <= set(names):
-        return WheeledBody(scene, controller, agent)
+        from ig2mj.planning.arms import ArmBody, model_of_arm
+
+        model = model_of_arm(scene, controller, agent)
+        return WheeledBody(scene, controller, agent) if model is None else ArmBody(scene, controller, agent, model)
     raise PlanningError(f"robot '{scene.tables.agent_names[agent]}' has no base that planned ways can move")
+
+
+@runtime_checkable
+class Follower(Protocol):
+    """Whether the arm that carries a hand follows ways of it; from one place of the base, with one orientation."""
+
+    def reaches(self, point: Float[np.ndarray, "3"]) -> bool:
+        """Whether the hand can be at a point of the world, m."""
+        ...
+
+    def __call__(self, points: Sequence[np.ndarray]) -> bool:
+        """Whether it goes along points of the world, m, the first of which is not where it is."""
+        ...
+
+
+@runtime_checkable
+class HandedBody(Body, Protocol):
+    """A robot whose hands are planned: floating ones, or such that are carried by an arm.
+
+    Attributes:
+      reach: m from a shoulder that a hand goes. shoulders, carry, rest: [H, 3] m, in the frame of the base: of the
+        shoulders, and of the grasp points where hands carry things and where empty hands rest.
+      away: m, horizontal, that the base is at least to be from what a hand does.
+      trunk: m, radius and height of the upright body that what is held keeps clear of.
+      resting: m, heights of empty hands at rest, and how far from the axis they reach; None: the footprint has them.
+      arm: bodies, of the scene, that move with the hands and do not count where the robot stands.
+      rises: m by which the body stoops, and stretches, for what its hands do not reach otherwise. tucked: [H, 3] m, where
+        empty hands are in narrow places; None: as they are.
+      opening: m between the fingers of a gripper; None: a hand that takes hold with its palm.
+    """
+
+    reach: float
+    shoulders: Float[np.ndarray, "H 3"]
+    carry: Float[np.ndarray, "H 3"]
+    rest: Float[np.ndarray, "H 3"]
+    away: float
+    trunk: tuple[float, float]
+    resting: tuple[float, float, float] | None
+    arm: Int[np.ndarray, "n"]
+    opening: float | None
+    rises: tuple[float, float]
+    tucked: Float[np.ndarray, "H 3"] | None
+    stands: float
+
+    def turned(self, hand: int, fingers: Direction, palm: Direction) -> tuple[float, float, float, float]:
+        """Orientation of a hand whose fingers point, and whose palm faces, along directions at right angles."""
+        ...
+
+    def axes(self, hand: int, frame: Float[np.ndarray, "3 3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """Where the fingers point, and the palm faces, of a hand turned so: the inverse of `turned`."""
+        ...
+
+    def hand_spheres(self, fingers: Direction, palm: Direction) -> Float[np.ndarray, "S 4"]:
+        """x, y, z from a hand's grasp point (world axes) and radius of spheres that hold an open hand, m."""
+        ...
+
+    def prepared(self, program: Sequence[Phase]) -> list[Phase]:
+        """A program as this body carries it out."""
+        ...
+
+    def follower(
+        self,
+        joints: Float[np.ndarray, "J"],
+        at_rest: bool,
+        base: tuple[Float[np.ndarray, "3"], float],
+        quat: Sequence[float] | np.ndarray,
+        obstacles: Obstacles,
+    ) -> Follower | None:
+        """Whether an arm carries the hand along ways; None: the hand floats.
+
+        Args:
+          joints: of all robots, now. at_rest: the arm begins where it rests. base: position and direction of the base.
+          quat: orientation of the hand on the way, w-x-y-z.
+        """
+        ...
 
 
 class _Body:
@@ -133,7 +219,7 @@ class _Body:
         rays = robot.hand_rays() if isinstance(robot, TaskRobot) else ()
         self.grips: Float[np.ndarray, "H 3"] = np.array([r.grasp_point for r in rays], float).reshape(-1, 3)
         controls: Sequence[HandControl] = robot.hand_controls if isinstance(robot, TaskRobot) else ()
-        self._controls = controls
+        self._controls: Sequence[HandControl] = controls
         self._rest = np.zeros(self.size, np.float32)
         for control in controls:
             if control.rests_open:
@@ -173,9 +259,15 @@ class HoveringBody(_Body):
     """
 
     sideways = True
+    away = 0.0
+    trunk = (BODY_RADIUS + 0.01, 2 * BODY_HEIGHT)
+    resting = (0.56, 0.8, 0.33)
+    rises = (-0.3, 0.25)
+    opening = None
 
     def __init__(self, scene: Scene, controller: Controller, agent: int):
         super().__init__(scene, controller, agent)
+        self.arm = np.zeros(0, int)
         robot = scene.agents[agent]
         self.stands = float(robot.stands) if isinstance(robot, TaskRobot) else 0.0
         self.reach, self.shoulders = HAND_REACH - SPARE_REACH, np.array(SHOULDER_POS)
@@ -228,6 +320,21 @@ class HoveringBody(_Body):
         w, x, y_, z_ = np.asarray(matrix_to_quat(matrix), float)
         return (float(w), float(x), float(y_), float(z_))
 
+    def axes(self, hand: int, frame: Float[np.ndarray, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
+        """See `HandedBody.axes`."""
+        return frame[:, 1] * (1.0 if hand == 0 else -1.0), frame[:, 2]
+
+    def hand_spheres(self, fingers: Direction, palm: Direction) -> Float[np.ndarray, "S 4"]:
+        """See `HandedBody.hand_spheres`."""
+        return hand_spheres(fingers, palm)
+
+    def prepared(self, program: Sequence[Phase]) -> list[Phase]:
+        """As it is."""
+        return list(program)
+
+    def follower(self, *_: Any) -> None:
+        """None: the hands float."""
+
     def _hand(
         self, senses: Senses, rows: Rows, number: int
     ) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"]]:
@@ -241,6 +348,16 @@ class HoveringBody(_Body):
         turn = np.where(rows["turns"][:, None] > 0, np.asarray(quat_rotate_inverse(base, left)), 0.0)
         turn *= np.minimum(1.0, HAND_TURN_STEP / np.maximum(np.asarray(length(turn)), 1e-6))[:, None]
         return move, turn
+
+
+def hand_spheres(fingers: Direction, palm: Direction) -> Float[np.ndarray, "S 4"]:
+    """x, y, z from a floating hand's grasp point (world axes) and radius of spheres that hold it open, m; five of the
+    palm first."""
+    ahead, back = np.asarray(fingers, float), -BEHIND * np.asarray(palm, float)
+    side = np.cross(ahead, np.asarray(palm, float))
+    corners = [(0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
+    centres = [back + CORNER * (a * ahead + b * side) for a, b in corners] + [back + a * ahead for a in ALONG]
+    return np.array([[*c, RADIUS] for c in centres])
 
 
 SPARE_REACH, CARRY, TUCKED = 0.05, (0.34, 0.16, 0.5), (0.1, 0.1, 0.1)

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.planning.bodies import Follower
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp
@@ -23,7 +24,7 @@ from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
-from ig2mj.planning.world import BODY, DirtSpot, PlannedWorld, Rotation, Stance, Vector, about_vertical, turn_onto
+from ig2mj.planning.world import DirtSpot, PlannedWorld, Rotation, Stance, Vector, about_vertical, turn_onto
 
 ROUNDS, STROKES = 24, 8
 """Stances from which an object is cleaned, and places of the tool for each, at most."""
@@ -202,14 +203,16 @@ def _plan(
             if any(np.linalg.norm(np.subtract(stance.xy, v.xy)) < ELSEWHERE for v in visited):
                 continue
             for turn, region in enumerate(_regions(world, tool, hand, stance, aim.normal)):
-                standing, start = obstacles.about(stance.xy, *BODY), world.carried(hand, stance)
+                standing, start = obstacles.about(stance.xy, *world.body.trunk), world.carried(hand, stance)
                 clear = _room(standing, _spheres(world, tool, hand, region))
                 plan = _strokes(world, hand, stance, turn, region, spots, clear)
                 if plan is None or (best is not None and len(plan.covered) <= len(best.covered)):
                     continue
                 yaw = stance.yaw
+                follows = world.follows(hand, world.turned_hand(hand, region.rotation), standing, stance)
                 if any(
-                    _way(world, tool, hand, standing, yaw, region, start, stroke[0]) for stroke in plan.strokes[:FEW]
+                    _way(world, tool, hand, standing, yaw, region, start, stroke[0], follows)
+                    for stroke in plan.strokes[:FEW]
                 ):
                     best = plan
     return best
@@ -272,12 +275,11 @@ def _way(
     region: _Region,
     start: Vector,
     spot: DirtSpot,
-    search: bool = False,
+    follows: Follower | None = None,
 ) -> list[Vector] | None:
     """The hand's way to above a particle; None: there is none."""
-    return hand_path(
-        obstacles, _spheres(world, tool, hand, region), start, region.at(spot) + LIFTED * spot.normal, [UP, -ahead(yaw)]
-    )
+    spheres, goal = _spheres(world, tool, hand, region), region.at(spot) + LIFTED * spot.normal
+    return hand_path(obstacles, spheres, start, goal, [UP, -ahead(yaw)], follows=follows)
 
 
 def _program(world: PlannedWorld, tool: str, hand: int, plan: _CleanPlan, spot: DirtSpot) -> Program:
@@ -286,11 +288,11 @@ def _program(world: PlannedWorld, tool: str, hand: int, plan: _CleanPlan, spot: 
     regions = _regions(world, tool, hand, stance, spot.normal)
     regions = [regions[min(plan.turn, len(regions) - 1)]]
     regions += [_turned(world, tool, hand, regions[0], spot.normal, angle) for angle in TURNS]
-    for search in (False, True):
-        for region in regions:
-            way = _way(world, tool, hand, obstacles, stance.yaw, region, world.grip(hand), spot, search)
-            if way is not None:
-                return _press(world, tool, hand, region, spot, way)
+    for region in regions:
+        follows = world.follows(hand, world.turned_hand(hand, region.rotation), obstacles)
+        way = _way(world, tool, hand, obstacles, stance.yaw, region, world.grip(hand), spot, follows)
+        if way is not None:
+            return _press(world, tool, hand, region, spot, way)
     return []
 
 

@@ -12,7 +12,7 @@ import copy
 import dataclasses
 import functools
 import itertools
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -214,6 +214,7 @@ def hand_way(
     start: np.ndarray,
     goal: np.ndarray,
     spare: float = 0.0,
+    accepts: Callable[[list[np.ndarray]], bool] = lambda way: True,
 ) -> list[np.ndarray] | None:
     """Points of a hand's way from one point to another, without the first; None: no way was found.
 
@@ -221,7 +222,7 @@ def hand_way(
     first, which is blocked most often.
 
     Args:
-      spheres, spare: see `straight`.
+      spheres, spare: see `straight`. accepts: of a way that is free: the arm that carries the hand follows it.
     """
 
     def free(points: Sequence[np.ndarray]) -> bool:
@@ -230,7 +231,7 @@ def hand_way(
             if not straight(obstacles, spheres, b, a, ends):
                 return False
             ends = 0.0
-        return True
+        return accepts([*points, goal])
 
     if free([]):
         return [goal]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator
 import numpy as np
 from jaxtyping import Float
 
-from ig2mj.planning.bodies import HoveringBody
+from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.motion_planner import NEAR_START, FreeFloor, Point
 from ig2mj.planning.moves import Primitive, Program, free_hand
 from ig2mj.planning.occupancy import door_objects
@@ -77,7 +77,7 @@ def door_in_the_way(world: PlannedWorld, step: Step) -> str | None:
     if point is None:
         return None
     here, _ = world.base
-    floor, reach = world.floor(), world.body.reach if isinstance(world.body, HoveringBody) else NEAR
+    floor, reach = world.floor(), world.body.reach if isinstance(world.body, HandedBody) else NEAR
     if _nearest(world, floor, point, reach) is not None:
         return None
     held = [world.index(n) for n in world.held if n and not world.domain.fixed(n)]

@@ -82,7 +82,9 @@ def stretch(rise: float) -> Phase:
 
 
 def tuck(world: PlannedWorld) -> Program:
-    """Fingers of empty hands point up, so that the robot fits where they would stick out."""
+    """Fingers of empty hands that float point up, so that the robot fits where they would stick out."""
+    if world.body.tucked is None:
+        return []
     return [
         Phase(hand=hand, pos=vector3(world.body.tucked[hand]), quat=world.body.turned(hand, UP, FORWARDS), in_body=True,
               tolerance=0.05, turn_tolerance=0.3, limit=15, after="")

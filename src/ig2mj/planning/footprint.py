@@ -50,16 +50,23 @@ class BaseFootprint:
 
     @classmethod
     def of_robot(
-        cls, scene: Scene, view: PhysicsView, agent: int = 0, world: int = 0, without_hands: Collection[int] = ()
+        cls,
+        scene: Scene,
+        view: PhysicsView,
+        agent: int = 0,
+        world: int = 0,
+        without_hands: Collection[int] = (),
+        without_bodies: Collection[int] = (),
     ) -> BaseFootprint:
         """That of a robot as it stands in a view.
 
         Args:
           view: with a world axis; `world` of it. agent: number of the robot. without_hands: numbers of hands, among all
-            of the scene, that do not count.
+            of the scene, that do not count. without_bodies: of the model, that do not count either.
         """
         model, tables = scene.model, scene.tables
         counts = (tables.body_agent == agent) & ~np.isin(tables.body_hand, list(without_hands))
+        counts[list(without_bodies)] = False
         geoms = np.flatnonzero(counts[model.geom_bodyid] & ((model.geom_contype | model.geom_conaffinity) != 0))
         bodies = model.geom_bodyid[geoms]
         pos, quat = (np.asarray(a)[world, bodies] for a in (view.body_pos, view.body_quat))

@@ -88,10 +88,11 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     here, _ = world.base
     start = pose.at(pose.before)
     spheres = world.spheres(pose.fingers, pose.palm)
-    way = hand_path(world.obstacles([name]), spheres, world.grip(hand), start, entries(pose, here), search=True)
+    quat, obstacles = world.body.turned(hand, pose.fingers, pose.palm), world.obstacles([name])
+    follows = world.follows(hand, quat, obstacles)
+    way = hand_path(obstacles, spheres, world.grip(hand), start, entries(pose, here), search=True, follows=follows)
     if way is None:
         return "no_path", f"the hand has no way to {name}"
-    quat = world.body.turned(hand, pose.fingers, pose.palm)
     lift = LIFT * UP * float(pose.palm @ UP > -0.9)
     deep = vector3(pose.at(-BELOW))
     reason = yield [
@@ -129,12 +130,12 @@ def _plan(
     poses = [p for p in grasp_poses(world, name, obstacles) if not any(_alike(p, t) for t in tried)]
     if not poses:
         return None
-    points = np.array([p.point for p in poses])
+    points, on_arm = np.array([p.point for p in poses]), world.body.opening is not None
 
     def candidates() -> Iterator[tuple[Stance, GraspPose]]:
         for point in (world.com(name), *points[_spread(points, world.com(name))], _nearest(world, floor, points)):
             for stance in world.stances(hand, point, floor, AWAY):
-                near = [p for p in ordered(poses, stance.yaw) if world.reaches(hand, stance, p.at(p.before))]
+                near = [p for p in ordered(poses, stance.yaw, on_arm) if world.reaches(hand, stance, p.at(p.before))]
                 if prefers is not None:
                     near.sort(key=_less_wanted(prefers))
                 yield from ((stance, pose) for pose in near[:POSES])
@@ -142,7 +143,9 @@ def _plan(
     def has_way(candidate: tuple[Stance, GraspPose], search: bool) -> bool:
         stance, pose = candidate
         spheres, goal, back = world.spheres(pose.fingers, pose.palm), pose.at(pose.before), entries(pose, stance.xy)
-        return hand_path(obstacles, spheres, world.resting(hand, stance), goal, back, search=search) is not None
+        follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles, stance)
+        rests = world.resting(hand, stance)
+        return hand_path(obstacles, spheres, rests, goal, back, search=search, follows=follows) is not None
 
     return first_way(candidates(), has_way, WAYS)
 

@@ -14,8 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.clearance import Obstacles
-from ig2mj.planning.world import PlannedWorld, Vector, hand_spheres
+from ig2mj.planning.world import PlannedWorld, Vector
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -30,6 +31,13 @@ BEFORE = (0.12, 0.06)
 
 AT_OBJECT = 0.4
 """Share of the spheres' radii that keeps clear of others where the hand takes hold: its parts are thinner."""
+
+OBLIQUE = (0.9, 0.44)
+"""Ahead and down: where a gripper on an arm likes to point, a unit vector."""
+
+BITE, SPARE_OPENING, SLICES = 0.02, 0.012, 25
+"""m beyond a surface at which the width of an object is looked at, m that open fingers are wider than it, and points
+between the fingers that are looked at."""
 
 APART = 0.03
 """m between points of a side."""
@@ -61,10 +69,12 @@ class GraspPose:
         """A point above the surface, m along its normal."""
         return self.point - away * self.palm
 
-    def discomfort(self, yaw: float) -> float:
+    def discomfort(self, yaw: float, on_arm: bool = False) -> float:
         """How far a hand of a robot that looks along `yaw` (rad) is turned from where it likes to be: palm down or
-        forwards, fingers forwards or upwards."""
+        forwards, fingers forwards or upwards. A gripper on an arm likes to point ahead or obliquely down."""
         ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+        if on_arm:
+            return 1.0 - float(self.palm @ (OBLIQUE[0] * ahead - OBLIQUE[1] * UP))
         palm = float(np.clip(1.0 - max(self.palm @ -UP, 0.85 * (self.palm @ ahead)), 0.0, 2.0))
         fingers = float(np.clip(1.0 - max(self.fingers @ ahead, self.fingers @ UP), 0.0, 2.0))
         return palm + 0.5 * fingers
@@ -119,14 +129,39 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     if not points:
         return []
     points, fingers, palms = np.array(points), np.array(fingers), np.array(palms)
-    before = np.where(_room(obstacles, points, fingers, palms, 0.0, AT_OBJECT), 0.0, -1.0)
+    body = world.body
+    before = np.where(_room(body, obstacles, points, fingers, palms, 0.0, AT_OBJECT), 0.0, -1.0)
     for away in BEFORE:
         still = np.flatnonzero(before == 0.0)
-        before[still[_room(obstacles, points[still], fingers[still], palms[still], away, 1.0)]] = away
-    return [GraspPose(points[k], fingers[k], palms[k], float(before[k])) for k in np.flatnonzero(before > 0)]
+        before[still[_room(body, obstacles, points[still], fingers[still], palms[still], away, 1.0)]] = away
+    found = [GraspPose(points[k], fingers[k], palms[k], float(before[k])) for k in np.flatnonzero(before > 0)]
+    if body.opening is None:
+        return found
+    others = set(range(len(tables.object_names))) - {index}
+    own = world.planner.obstacles(world.view, others, world.world)
+    return [fits for pose in found if (fits := _between_fingers(own, pose, body.opening)) is not None]
+
+
+def _between_fingers(own: Obstacles, pose: GraspPose, opening: float) -> GraspPose | None:
+    """A pose with the object in the middle between the fingers of a gripper; None: it is too wide there, or misses.
+
+    Args:
+      own: the object alone. opening: m between the fingers.
+    """
+    half = opening / 2
+    along = np.linspace(-half, half, SLICES)
+    at = pose.at(-BITE) + along[:, None] * pose.fingers
+    inside = own.distance(at) < 0.0
+    if not inside.any():
+        return None
+    low, high = float(along[inside].min()), float(along[inside].max())
+    if high - low > opening - 2 * SPARE_OPENING:
+        return None
+    return dataclasses.replace(pose, point=pose.point + (low + high) / 2 * pose.fingers)
 
 
 def _room(
+    body: HandedBody,
     obstacles: Obstacles,
     points: Float[np.ndarray, "N 3"],
     fingers: Float[np.ndarray, "N 3"],
@@ -137,12 +172,12 @@ def _room(
     """Whether hands have room so far above surfaces."""
     if not len(points):
         return np.zeros(0, bool)
-    spheres = np.stack([hand_spheres(f, p) for f, p in zip(fingers, palms, strict=True)])
+    spheres = np.stack([body.hand_spheres(f, p) for f, p in zip(fingers, palms, strict=True)])
     centres = (points - away * palms)[:, None] + spheres[..., :3]
     distance = obstacles.distance(centres.reshape(-1, 3)).reshape(centres.shape[:2])
     return np.all(distance >= share * spheres[..., 3], axis=1)
 
 
-def ordered(poses: Sequence[GraspPose], yaw: float) -> list[GraspPose]:
-    """The most comfortable first, for a robot that looks along `yaw`, rad."""
-    return sorted(poses, key=lambda pose: pose.discomfort(yaw) + (0.2 if pose.before < BEFORE[0] else 0.0))
+def ordered(poses: Sequence[GraspPose], yaw: float, on_arm: bool = False) -> list[GraspPose]:
+    """The most comfortable first, for a robot that looks along `yaw`, rad. on_arm: its hand is on an arm."""
+    return sorted(poses, key=lambda pose: pose.discomfort(yaw, on_arm) + (0.2 if pose.before < BEFORE[0] else 0.0))

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ig2mj.planning.bodies import Follower
 from ig2mj.planning.clearance import Obstacles, hand_way, straight
 from ig2mj.planning.hand_search import search_way
 from ig2mj.planning.phases import Phase, Until
@@ -64,19 +65,30 @@ def hand_path(
     entries: Sequence[Vector] = (),
     spare: float = 0.0,
     search: bool = False,
+    follows: Follower | None = None,
 ) -> list[Vector] | None:
     """Points of a hand's way, without the first; None: no way was found. See `ig2mj.planning.clearance.hand_way`.
 
     Args:
       entries: unit vectors from the goal, along which a hand comes straight to it where nothing else is free.
       search: ways around obstacles are searched for (`ig2mj.planning.hand_search`), where via points find none.
+      follows: of the arm that carries the hand; None: it floats.
     """
+    if follows is not None:
+        if spare == 0.0 and not obstacles.clear(spheres + np.array([*goal, 0.0])):
+            return None
+        if not follows.reaches(goal):
+            return None
+
+    def accepts(way: list[Vector]) -> bool:
+        return follows is None or follows(way)
+
     if spare > 0.0:  # what is put down comes to right above its place first
         over = goal + OVER * UP
-        way = hand_path(obstacles, spheres, start, over, entries, search=search)
+        way = hand_path(obstacles, spheres, start, over, entries, search=search, follows=follows)
         if way is not None:
             return [*way, goal]
-    way = hand_way(obstacles, spheres, start, goal, spare)
+    way = hand_way(obstacles, spheres, start, goal, spare, accepts=accepts)
     if way is not None:
         return way
     ends = list[Vector]()
@@ -86,14 +98,14 @@ def hand_path(
                 break  # farther ones lead through the same
             ends.append(goal + apart * entry)
     for end in ends:
-        way = hand_way(obstacles, spheres, start, end)
+        way = hand_way(obstacles, spheres, start, end, accepts=lambda way: accepts([*way, goal]))
         if way is not None:
             return [*way, goal]
     if not search:
         return None
     for end in [goal] if spare == 0.0 else ends[:1]:
         way = search_way(obstacles, spheres, start, end)
-        if way is not None:
+        if way is not None and accepts(way if end is goal else [*way, goal]):
             return way if end is goal else [*way, goal]
     return None
 

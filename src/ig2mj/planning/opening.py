@@ -213,7 +213,9 @@ def _plan(
                 spheres = world.spheres(_fingers(normal, pulls, hand), -normal)
                 before = first + ABOVE * normal
                 back = [-ahead(stance.yaw), normal, UP]
-                if hand_path(obstacles, spheres, world.resting(hand, stance), before, back) is None:
+                quat = world.body.turned(hand, _fingers(normal, pulls, hand), -normal)
+                follows = world.follows(hand, quat, obstacles, stance)
+                if hand_path(obstacles, spheres, world.resting(hand, stance), before, back, follows=follows) is None:
                     continue
                 passed += 1
                 if passed > tried:
@@ -240,7 +242,9 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
     quat = world.body.turned(hand, fingers, -normal)
     _, yaw = world.base
     before, back = first + ABOVE * normal, [-ahead(yaw), normal, UP]
-    way = hand_path(world.obstacles(), world.spheres(fingers, -normal), world.grip(hand), before, back)
+    obstacles = world.obstacles()
+    follows = world.follows(hand, quat, obstacles)
+    way = hand_path(obstacles, world.spheres(fingers, -normal), world.grip(hand), before, back, follows=follows)
     if way is None:
         return None
     program = travel(hand, way, quat)

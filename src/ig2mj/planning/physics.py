@@ -17,7 +17,7 @@ from ig2mj.agents.humanoid.robot import Humanoid
 from ig2mj.agents.registry import find_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.planning import execution
-from ig2mj.planning.bodies import HoveringBody, body_of
+from ig2mj.planning.bodies import HandedBody, body_of
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.motion_planner import MotionPlanner
@@ -36,8 +36,10 @@ MOST_STEPS = 3000
 def check_robot(robot: str | TaskRobot) -> None:
     """Raises PlanningError: motion of the hands of a robot cannot be planned."""
     name, body = find_robot(robot)
-    if not isinstance(body, Humanoid):
-        raise PlanningError(f"motion of the hands of robot '{name}' cannot be planned (take humanoid)")
+    if not isinstance(body, Humanoid) and not (body.drives and body.hand_count == 1):
+        several = "has several arms" if body.drives else "has no base that moves"
+        lacks = several if body.hand_count else "has no hand"
+        raise PlanningError(f"motion of the hands of robot '{name}', which {lacks}, cannot be planned (take humanoid)")
 
 
 class PhysicsRung:
@@ -96,7 +98,7 @@ class PhysicsRung:
         Raises:
           UnknownNameError: no such object or room. PlanningError: the robot lacks what the primitive takes.
         """
-        if step.primitive != "navigate_to" and not isinstance(self.body, HoveringBody):
+        if step.primitive != "navigate_to" and not isinstance(self.body, HandedBody):
             name = self.stage.scene.tables.agent_names[self.stage.agent]
             lacks = "has no hand" if not len(self.body.hands) else "has no hand whose motion can be planned"
             raise PlanningError(f"robot '{name}' {lacks}: '{step.primitive}' takes one (humanoid has two)")
@@ -144,6 +146,7 @@ class PhysicsRung:
 
     def _follow(self, world: int, program: Program) -> None:
         """A world's program, in place of the present one."""
+        program = self.body.prepared(program) if isinstance(self.body, HandedBody) else program
         self._programs[world] = program
         new: list[list[Phase] | None] = [None] * self.num_worlds
         new[world] = program

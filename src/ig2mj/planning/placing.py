@@ -31,7 +31,7 @@ from ig2mj.planning.moves import (
 from ig2mj.planning.opening import Tried, open_into
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import BODY, PlannedWorld, Spot, Stance, Vector
+from ig2mj.planning.world import PlannedWorld, Spot, Stance, Vector
 
 SPARE = 0.03
 """m before its place from which on an object may touch what is around."""
@@ -39,8 +39,8 @@ SPARE = 0.03
 DEEP = 0.4
 """m above a spot in a container that is open above, from which an object is let down to it."""
 
-STANCES, WAYS = 3, 30
-"""Stances for each spot, and ways of a hand that are looked for, at most."""
+STANCES, WAYS, ARM_WAYS = 3, 30, 200
+"""Stances for each spot, and ways of a hand that are looked for, at most: of one that floats, and of one on an arm."""
 
 
 def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[[PlannedWorld, Step], Primitive]:
@@ -83,9 +83,10 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             fingers, palm = world.hand_axes(hand, rotation)
             target = target + LET_GO * UP
             spheres = world.spheres(fingers, palm, holding=name, hand=hand, rotation=rotation)
-            way = hand_path(
-                world.obstacles([name], world.stance), spheres, world.grip(hand), target, [UP, -ahead(yaw)], SPARE, True
-            )
+            obstacles = world.obstacles([name], world.stance)
+            follows = world.follows(hand, quat, obstacles)
+            back = [UP, -ahead(yaw)]
+            way = hand_path(obstacles, spheres, world.grip(hand), target, back, SPARE, True, follows)
             if way is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
@@ -171,19 +172,21 @@ def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int)
         nonlocal lacking
         for spot, target, spheres in spots():
             lacking = _NO_STANCE if lacking == _NO_WAY and not seen else lacking
+            palm = world.hand_axes(hand, world.grip_for(hand, name, spot)[2])[1]
             for stance in world.stances(hand, target, floor, world.away(spheres), most=STANCES):
                 lacking = _NO_WAY
-                seen.append(stance)
-                yield stance, spot
+                if world.points_ahead(palm, stance):
+                    seen.append(stance)
+                    yield stance, spot
 
     def has_way(candidate: tuple[Stance, Spot], search: bool) -> bool:
         stance, spot = candidate
-        target, _, rotation = world.grip_for(hand, name, spot)
+        target, quat, rotation = world.grip_for(hand, name, spot)
         spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
         start, back = world.carried(hand, stance), [UP, -ahead(stance.yaw)]
-        return (
-            hand_path(obstacles.about(stance.xy, *BODY), spheres, start, target + LET_GO * UP, back, SPARE, search)
-            is not None
-        )
+        standing = obstacles.about(stance.xy, *world.body.trunk)
+        follows = world.follows(hand, quat, standing, stance)
+        return hand_path(standing, spheres, start, target + LET_GO * UP, back, SPARE, search, follows) is not None
 
-    return first_way(candidates(), has_way, WAYS) or lacking
+    most = WAYS if world.body.opening is None else ARM_WAYS
+    return first_way(candidates(), has_way, most) or lacking

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ig2mj.planning.bodies import WheeledBody
+from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.cleaning import clean
 from ig2mj.planning.doors import through_doors
 from ig2mj.planning.driving import drive_near, go
@@ -58,7 +58,7 @@ def _guarded(inner: Primitive) -> Primitive:
 
 def navigate_to(world: PlannedWorld, step: Step) -> Primitive:
     """To where a hand reaches the object; a robot without hands that are planned, to near it."""
-    if isinstance(world.body, WheeledBody):
+    if not isinstance(world.body, HandedBody):
         return Outcome(*(yield from drive_near(world, step.object)))
     reason, hand, floor = "no_base", len(world.body.hands) - 1, world.floor()
     for point in (world.com(step.object), *world.rim(step.object)):

@@ -120,7 +120,9 @@ def _plan(world: PlannedWorld, name: str, other: str, hand: int, passed: int) ->
         stance, point, way = candidate
         spheres, goal = world.spheres(UP, way), point - BEHIND * way
         entries = [-way, UP, -ahead(stance.yaw)]
-        found = hand_path(obstacles, spheres, world.resting(hand, stance), goal, entries, search=search) is not None
+        follows = world.follows(hand, world.body.turned(hand, UP, way), obstacles, stance)
+        rests = world.resting(hand, stance)
+        found = hand_path(obstacles, spheres, rests, goal, entries, search=search, follows=follows) is not None
         seen += found
         return found and seen > passed
 
@@ -132,7 +134,9 @@ def _program(world: PlannedWorld, name: str, other: str, hand: int, point: Vecto
     _, gap = _gap(world, name, other)
     quat, start = world.body.turned(hand, UP, way), point - BEHIND * way
     entries = [-way, UP, -ahead(world.base[1])]
-    found = hand_path(world.obstacles(), world.spheres(UP, way), world.grip(hand), start, entries, search=True)
+    obstacles, spheres = world.obstacles(), world.spheres(UP, way)
+    follows = world.follows(hand, quat, obstacles)
+    found = hand_path(obstacles, spheres, world.grip(hand), start, entries, search=True, follows=follows)
     if found is None:
         return []
     end = point + (min(gap, STROKE) + PRESS) * way

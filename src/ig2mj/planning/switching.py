@@ -58,9 +58,9 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
                 continue
             fingers = towards(world.base[0], button)
             quat = world.body.turned(hand, fingers, DOWN)
-            way = hand_path(
-                world.obstacles(), world.spheres(fingers), world.grip(hand), aim, [UP, -fingers], search=True
-            )
+            obstacles, spheres = world.obstacles(), world.spheres(fingers)
+            follows, back = world.follows(hand, quat, obstacles), [UP, -fingers]
+            way = hand_path(obstacles, spheres, world.grip(hand), aim, back, search=True, follows=follows)
             if way is None:
                 reason, detail = "no_path", f"the hand has no way to the button of {name}"
                 continue
@@ -102,7 +102,9 @@ def _plan(
         nonlocal passed
         stance, aim, _ = candidate
         fingers, rests = towards(stance.xy, point), world.resting(hand, stance)
-        found = hand_path(obstacles, world.spheres(fingers), rests, aim, [UP, -fingers], search=search) is not None
+        follows = world.follows(hand, world.body.turned(hand, fingers, DOWN), obstacles, stance)
+        spheres, back = world.spheres(fingers), [UP, -fingers]
+        found = hand_path(obstacles, spheres, rests, aim, back, search=search, follows=follows) is not None
         passed += found
         return found and passed > attempt
 

@@ -23,7 +23,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import AWAY, BODY, PlannedWorld, Rotation, Stance, Vector, about_vertical, turn_onto
+from ig2mj.planning.world import AWAY, PlannedWorld, Rotation, Stance, Vector, about_vertical, turn_onto
 from ig2mj.scene.tables import LinkKind
 
 
@@ -64,9 +64,10 @@ def _hold_at(
             stance, point, offset, tilt = candidate
             turn = about_vertical(stance.yaw - now)
             spheres = _spheres(world, name, hand, turn @ tilt)
-            standing, start = obstacles.about(stance.xy, *BODY), world.carried(hand, stance)
+            standing, start = obstacles.about(stance.xy, *world.body.trunk), world.carried(hand, stance)
             target, back = point + turn @ offset, [UP, -ahead(stance.yaw)]
-            return hand_path(standing, spheres, start, target, back, search=search) is not None
+            follows = world.follows(hand, world.turned_hand(hand, turn @ tilt), standing, stance)
+            return hand_path(standing, spheres, start, target, back, search=search, follows=follows) is not None
 
         found = first_way(candidates(), has_way, WAYS)
         if found is None:
@@ -77,7 +78,11 @@ def _hold_at(
         if (yield from go(world, stance)):
             continue
         back, obstacles = [UP, -ahead(world.base[1])], world.obstacles([name], world.stance)
-        way = hand_path(obstacles, _spheres(world, name, hand, turned), world.grip(hand), target, back, search=True)
+        spheres, follows = (
+            _spheres(world, name, hand, turned),
+            world.follows(hand, world.turned_hand(hand, turned), obstacles),
+        )
+        way = hand_path(obstacles, spheres, world.grip(hand), target, back, search=True, follows=follows)
         if way is not None:
             quat, keeps = world.turned_hand(hand, turned), world.index(name)
             turns = Phase(hand=hand, pos=vector3(world.grip(hand)), quat=quat, keeps=keeps, tolerance=0.05, limit=30,

@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.agents.humanoid.frames import BODY_HEIGHT
-from ig2mj.agents.humanoid.robot import BODY_RADIUS
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.host_rotations import matrix_to_quat, quat_conjugate, quat_multiply
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.bodies import Senses, grip_of, sense
+from ig2mj.planning.bodies import ALONG, Follower, HandedBody, Senses, grip_of, sense
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
@@ -31,16 +29,11 @@ from ig2mj.states.definitions.dust import DUST
 from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.particles import world_normals, world_positions
 
-RADIUS, CORNER, BEHIND, ALONG = 0.03, 0.03, 0.014, (0.07, 0.1)
-"""m: of the spheres of a hand: radius; of the palm's corners from its middle, along the fingers and across; of the palm
-behind the grasp point; of the fingers ahead of it."""
-
 HELD_POINTS, HELD_MARGIN, LATTICE = 60, 0.012, 0.04
 """Corners of what a hand holds that keep clear, and points within it, about; m by which they do, and between them."""
 
-BODY, BODY_SPARE = (BODY_RADIUS + 0.01, 2 * BODY_HEIGHT), 0.04
-"""m: radius and height of the body that what is held keeps clear of, and what is left between both when it is
-carried."""
+BODY_SPARE = 0.04
+"""m that are left between the body and what it carries."""
 
 APART = 0.12
 """m between stances for the same point, at least."""
@@ -50,13 +43,11 @@ SIDEWAYS = 0.4
 (iGibson's behavior_robot.py), is behind the body's axis and to the side, so that the hand reaches 0.3 m farther than
 ahead."""
 
-RESTING, TUCKED = (0.56, 0.8, 0.33), (0.5, 0.85, 0.22)
-"""m: heights of the hands at rest, and how far from the body's axis they reach; the same of hands whose fingers point
-up."""
+TUCKED = (0.5, 0.85, 0.22)
+"""m: heights of floating hands whose fingers point up, and how far from the body's axis they reach."""
 
-RISE, EFFORT = (-0.3, 0.25), 1.0
-"""m by which the body stoops, and stretches, for what its hands do not reach otherwise; m of way that a metre of it
-counts as."""
+EFFORT = 1.0
+"""m of way that a metre by which the body stoops, or stretches, counts as."""
 
 AWAY, FARTHEST = 0.55, 0.95
 """m, horizontal, that a base would like to be from what its hand does, and from where it puts what is large."""
@@ -78,6 +69,15 @@ LATER_SPOTS = 12
 
 TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 """rad about the vertical that an object may be turned by, from how it is held in front of the robot."""
+
+ACROSS = 0.85
+"""Cosine of the angle to where the robot looks beyond which a gripper points across."""
+
+LEVEL = 0.5
+"""Sine of the angle below the horizontal from which on a gripper points down."""
+
+ARM_TURNS = (0.0, *(sign * k * np.pi / 4 for k in (1, 2, 3) for sign in (1, -1)), np.pi)
+"""The same of a hand on an arm, which points about to where the robot looks."""
 
 ORIENTATIONS, ORIENTATION_SPREAD = 2, 1.7
 """Orientations at rest that are tried, and rad by which they may be farther from the present one than the nearest."""
@@ -191,7 +191,7 @@ class PlannedWorld:
     def obstacles(self, without: Collection[str] = (), at: Stance | None = None) -> Obstacles:
         """Pieces of everything but some objects; `at`: and the robot's body, if it stood there."""
         found = self.planner.obstacles(self.view, [self.index(n) for n in without], self.world)
-        return found if at is None else found.about(at.xy, *BODY)
+        return found if at is None else found.about(at.xy, *self.body.trunk)
 
     @property
     def stance(self) -> Stance:
@@ -234,13 +234,13 @@ class PlannedWorld:
         hand: int = 0,
         rotation: Rotation | None = None,
     ) -> np.ndarray:
-        """What keeps clear about a hand's grasp point: `hand_spheres`, and corners of what it holds.
+        """What keeps clear about a hand's grasp point: `HandedBody.hand_spheres`, and corners of what it holds.
 
         Args:
           fingers, palm: where they point, and it faces. holding: what it holds, whose corners keep clear, too.
           rotation: by which that is turned, world frame.
         """
-        found = hand_spheres(fingers, palm)
+        found = self.body.hand_spheres(fingers, palm)
         if holding:
             points = self.points(holding) - self.grip(hand)
             points = points if rotation is None else points @ rotation.T
@@ -271,7 +271,7 @@ class PlannedWorld:
         """Where a hand's fingers point, and its palm faces, if it were turned, world frame."""
         frame = matrices_on_host(self.hand_quat(hand)[None])[0]
         frame = frame if rotation is None else rotation @ frame
-        return frame[:, 1] * (1.0 if hand == 0 else -1.0), frame[:, 2]
+        return self.body.axes(hand, frame)
 
     def floor(self, holding: bool = False, reaching: bool = False) -> FreeFloor:
         """Where the robot can stand, without regard to what it holds.
@@ -281,14 +281,16 @@ class PlannedWorld:
         """
         view, number, hands = self.view, self.world, self.body.hands
         held = [n if n and not self.domain.fixed(n) else "" for n in self.held]
-        footprint = BaseFootprint.of_robot(self.stage.scene, view, self.stage.agent, number, hands.tolist())
-        if not all(held):
-            footprint = footprint.holding(*(RESTING if reaching else TUCKED))
+        counts = hands.tolist() if isinstance(self.body, HandedBody) else []
+        arm = [] if not counts or holding else self.body.arm.tolist()
+        footprint = BaseFootprint.of_robot(self.stage.scene, view, self.stage.agent, number, counts, arm)
+        if counts and not all(held) and self.body.resting is not None:
+            footprint = footprint.holding(*(self.body.resting if reaching else TUCKED))
         here, _ = self.base
         for hand, name in enumerate(held):
             if holding and name:
                 corners = np.concatenate(
-                    [self.vertices(name), hand_spheres(*self.hand_axes(hand))[:, :3] + self.grip(hand)]
+                    [self.vertices(name), self.body.hand_spheres(*self.hand_axes(hand))[:, :3] + self.grip(hand)]
                 )
                 away = float(np.linalg.norm(corners[:, :2] - here, axis=1).max())
                 footprint = footprint.holding(float(corners[:, 2].min()), float(corners[:, 2].max()), away)
@@ -317,7 +319,7 @@ class PlannedWorld:
         x, y, z = self.body.carry[hand]
         if name := name or self.held[hand]:
             low, high = self.vertices(name).min(0), self.vertices(name).max(0)
-            x = max(x, BODY[0] + BODY_SPARE + float(np.linalg.norm((high - low)[:2])) / 2)
+            x = max(x, self.body.trunk[0] + BODY_SPARE + float(np.linalg.norm((high - low)[:2])) / 2)
         return np.array([x, y, z])
 
     def from_body(self, point: Vector) -> Vector:
@@ -331,6 +333,20 @@ class PlannedWorld:
     def carried(self, hand: int, stance: Stance) -> Vector:
         """Where a hand's grasp point is carried, if the robot stood there; world frame."""
         return self._from(self.carry(hand), stance)
+
+    def follows(
+        self, hand: int, quat: Sequence[float] | np.ndarray, obstacles: Obstacles, stance: Stance | None = None
+    ) -> Follower | None:
+        """Whether an arm takes its hand along ways, turned to `quat`; None: the hand floats.
+
+        Args:
+          stance: of the robot, whose empty hands rest then; None: as it is.
+        """
+        joints, z = self.senses.joints, float(self.senses.base_pos[self.world, 2])
+        at = self.stance if stance is None else stance
+        resting = stance is not None and not self.held[hand]
+        row = np.zeros(0) if joints is None else joints[self.world].astype(float)
+        return self.body.follower(row, resting, (np.array([*at.xy, z]), at.yaw), quat, obstacles)
 
     def _from(self, point: Vector, stance: Stance) -> Vector:
         """A point of the body's frame, if the robot stood there."""
@@ -361,6 +377,7 @@ class PlannedWorld:
         """
         here, _ = self.base
         side = self.body.carry[hand][1]
+        away = max(away, self.body.away)
         cells = floor.within(point[:2], self.body.reach + abs(float(self.body.shoulders[hand][1])))
         middles = floor.occupancy.middles(cells)
         offset = point[:2] - middles
@@ -424,7 +441,9 @@ class PlannedWorld:
         above = point[..., 2] - (self.body.stands + z)
         span = np.sqrt(np.maximum(self.body.reach**2 - away**2, 0.0))
         rise = np.sign(above) * np.maximum(np.abs(above) - span, 0.0)
-        return np.where((away <= self.body.reach) & (rise >= RISE[0]) & (rise <= RISE[1]), rise, np.nan)
+        return np.where(
+            (away <= self.body.reach) & (rise >= self.body.rises[0]) & (rise <= self.body.rises[1]), rise, np.nan
+        )
 
     def dirt(self, predicate: str, name: str) -> list[DirtSpot]:
         """Particles that are left on an object: of dust for "dusty", of stains for "stained"; the nearest first."""
@@ -450,29 +469,32 @@ class PlannedWorld:
         placer, farther = Placer(self.query), self._out_of_reach()
         middle = self._middle_of_fixed_part(where) if predicate == "inside" else None
         around = self.obstacles([name])
-        for quat in self._upright(name):
-            for angle in TURNS:
-                new = _yawed(quat, angle)
-                for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
-                    found, asked = list[Vector](), 0
-                    positions = np.array(list(placer.spots(index, areas, new, self.rng, support))).reshape(-1, 3)
-                    cost = farther(positions)
-                    roofed = np.zeros(len(positions), bool)
-                    if middle is not None:  # below openings, and away from where doors shut
-                        roofed = self._roofed(positions, around)
-                        cost += np.linalg.norm((positions - middle)[:, :2], axis=1) + ROOFED * roofed
-                    for k in np.argsort(cost, kind="stable"):
-                        pos = positions[k]
-                        if not np.isfinite(cost[k]) or len(found) == EACH or asked == LATER_SPOTS:
-                            break
-                        if any(np.linalg.norm(pos - other) < SPREAD for other in found):
-                            continue
-                        asked += 1
-                        if predicate in ("on_top", "on_floor") or self._would_hold(predicate, name, where, pos, new):
-                            found.append(pos)
-                            yield Spot(pos, new, bool(roofed[k]))
-                    if found:
+        turned = [(quat, angle) for quat in self._upright(name) for angle in TURNS]
+        if self.body.opening is not None:
+            level = self._level(name) if predicate in ("inside", "under") else []
+            turned = [(quat, angle) for angle in ARM_TURNS for quat in (*level, *self._upright(name))]
+        for quat, angle in turned:
+            new = _yawed(quat, angle)
+            for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
+                found, asked = list[Vector](), 0
+                positions = np.array(list(placer.spots(index, areas, new, self.rng, support))).reshape(-1, 3)
+                cost = farther(positions)
+                roofed = np.zeros(len(positions), bool)
+                if middle is not None:  # below openings, and away from where doors shut
+                    roofed = self._roofed(positions, around)
+                    cost += np.linalg.norm((positions - middle)[:, :2], axis=1) + ROOFED * roofed
+                for k in np.argsort(cost, kind="stable"):
+                    pos = positions[k]
+                    if not np.isfinite(cost[k]) or len(found) == EACH or asked == LATER_SPOTS:
                         break
+                    if any(np.linalg.norm(pos - other) < SPREAD for other in found):
+                        continue
+                    asked += 1
+                    if predicate in ("on_top", "on_floor") or self._would_hold(predicate, name, where, pos, new):
+                        found.append(pos)
+                        yield Spot(pos, new, bool(roofed[k]))
+                if found:
+                    break
 
     def _roofed(self, positions: Float[np.ndarray, "n 3"], around: Obstacles) -> Bool[np.ndarray, "n"]:
         """Above which positions something is in the way of what is let down to them."""
@@ -501,7 +523,7 @@ class PlannedWorld:
             away = apart[tuple(np.moveaxis(cells, -1, 0))]
             above = pos[:, 2] - shoulder
             level = np.maximum(away - aside, 0.0)
-            far = np.hypot(level, above - np.clip(above, *RISE)) > self.body.reach
+            far = np.hypot(level, above - np.clip(above, *self.body.rises)) > self.body.reach
             return np.where(far, np.inf, np.maximum(away - EASY, 0.0))
 
         return farther
@@ -531,6 +553,26 @@ class PlannedWorld:
         kept = [quat for angle, quat in found if angle < found[0][0] + ORIENTATION_SPREAD][:ORIENTATIONS]
         return kept or [now]
 
+    def points_ahead(self, palm: Vector, stance: Stance) -> bool:
+        """Whether a gripper on an arm does not point back to the robot or across it; a floating hand may."""
+        flat = float(np.linalg.norm(palm[:2]))
+        front = about_vertical(stance.yaw)[:, 0]
+        return self.body.opening is None or flat < LEVEL or float(palm @ front) > ACROSS * flat
+
+    def _level(self, name: str) -> list[Float[np.ndarray, "4"]]:
+        """The orientation of an object that a gripper holds from above, if the gripper pointed ahead: there is no room
+        for an arm above most places inside of things. It comes to rest as it falls."""
+        if self.body.opening is None or name not in self.held:
+            return []
+        _, palm = self.hand_axes(self.held.index(name))
+        front = about_vertical(self.base[1])[:, 0]
+        axis = np.cross(palm, front)
+        if palm[2] > -LEVEL or np.linalg.norm(axis) < 1e-6:
+            return []
+        half = np.arccos(np.clip(palm @ front, -1.0, 1.0)) / 2
+        turn = np.concatenate([[np.cos(half)], np.sin(half) * axis / np.linalg.norm(axis)])
+        return [np.asarray(quat_multiply(turn, self.pose(name)[1]), float)]
+
     def _would_hold(self, predicate: str, name: str, where: str, pos: Vector, quat: np.ndarray) -> bool:
         """Whether a placement that does not depend on contact would be true."""
         before = self.query.save()
@@ -548,16 +590,6 @@ class PlannedWorld:
         rotation = matrices_on_host(turn[None])[0]
         target = spot.pos + rotation @ (self.grip(hand) - own_pos)
         return target, np.asarray(quat_multiply(turn, self.hand_quat(hand)), float), rotation
-
-
-def hand_spheres(fingers: Sequence[float] | np.ndarray, palm: Sequence[float] | np.ndarray) -> Float[np.ndarray, "S 4"]:
-    """x, y, z from a hand's grasp point (world axes) and radius of spheres that hold an open hand, m; five of the palm
-    first."""
-    ahead, back = np.asarray(fingers, float), -BEHIND * np.asarray(palm, float)
-    side = np.cross(ahead, np.asarray(palm, float))
-    corners = [(0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
-    centres = [back + CORNER * (a * ahead + b * side) for a, b in corners] + [back + a * ahead for a in ALONG]
-    return np.array([[*c, RADIUS] for c in centres])
 
 
 def _turned_vectors(yaw: Float[np.ndarray, "n"], vector: Vector) -> Float[np.ndarray, "n 3"]:

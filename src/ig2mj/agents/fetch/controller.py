@@ -113,6 +113,16 @@ class FetchController:
         self._drive = drive_limits(WHEEL_RADIUS, AXLE, MAX_WHEEL)
 
     @property
+    def rest(self) -> Float[np.ndarray, "14"]:
+        """Positions of the joints that inverse kinematics keep near."""
+        return self._start
+
+    @property
+    def stretch(self) -> Float[np.ndarray, "6"]:
+        """m and rad that the gripper is to move and turn at 1 of the action; see the module's text."""
+        return STRETCH
+
+    @property
     def action_size(self) -> int:
         return len(self.action_names)
 

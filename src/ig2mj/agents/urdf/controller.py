@@ -15,6 +15,7 @@ Axes: W worlds, J joints of the arm, G grippers and suction cups, F joints of al
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import jax.numpy as jnp
@@ -24,7 +25,7 @@ from jaxtyping import Bool, Float
 
 from ig2mj.agents.base import HandReading
 from ig2mj.agents.controllers import differential_drive, drive_limits, wheel_odometry
-from ig2mj.agents.kinematics import forward
+from ig2mj.agents.kinematics import Chain, forward
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.description import Description
 from ig2mj.agents.urdf.layout import OMNIDIRECTIONAL, Layout
@@ -35,6 +36,21 @@ from ig2mj.scene.tables import SceneTables
 LEASH = 0.15
 """rad or m, on top of two actions at full speed, that a servo's target may be ahead of its joint: a blocked arm
 does not push ever harder."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class UrdfArm:
+    """The arm that carries a hand.
+
+    Attributes:
+      chain: from the base to the hand. names: of its joints, which are numbers of the action, too.
+      rest: rad or m, at the start. speed: rad/s or m/s at 1 of the action.
+    """
+
+    chain: Chain
+    names: tuple[str, ...]
+    rest: Float[np.ndarray, "J"]
+    speed: Float[np.ndarray, "J"]
 
 
 @struct.dataclass
@@ -102,6 +118,10 @@ class UrdfController:
         if self._drive is not None:
             self._speeds = drive_limits(*self._drive).astype(np.float32)
         self._chains = [(body.chain(layout, link), np.array(body.chain_joints(layout, link), int)) for link in hands]
+        self.arms: tuple[UrdfArm | None, ...] = tuple(
+            None if c is None else UrdfArm(c, tuple(layout.arm[k] for k in at), self._start[at], self._arm_speed[at])
+            for c, at in self._chains
+        )
         single = len(grippers) == 1
         self.action_names: tuple[str, ...] = (
             *(("forward", "left", "turn_left") if glides else ("forward", "turn_left") if self._drive else ()),
