@@ -1,7 +1,5 @@
 """Ways of hands: the straight line, via points, RRT-Connect, and why there is none."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -77,6 +75,27 @@ def test_without_ompl_the_reason_names_the_extra(view, planner, monkeypatch):
 def test_arms_and_hands_that_are_not_there_are_refused(view, planner, tiny_home_folder):
     with pytest.raises(PlanningError, match="hands 0 to 1, not 2"):
         planner.plan_hand(view, (0.0, 0.0, 1.0), hand=2)
-    scene = ig2mj.load_scene(tiny_home_folder, agents=[dataclasses.replace(Fetch(), name="fetch")])
-    with pytest.raises(PlanningError, match="arms"):
-        MotionPlanner(scene).plan_arm(view, (0.0, 0.0, 1.0))
+    with pytest.raises(PlanningError, match="float: plan_hand"):
+        planner.plan_arm(view, (0.0, 0.0, 1.0))
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[Fetch().at(-1.4, -1.2, 0.0)])
+    with pytest.raises(PlanningError, match="plan_arm"):
+        MotionPlanner(scene).plan_hand(view, (0.0, 0.0, 1.0))
+
+
+@pytest.mark.slow
+def test_an_arm_has_a_way_in_its_joints_or_a_reason(tiny_home_folder):
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[Fetch().at(-1.4, -1.2, 0.0)])
+    view, planner = SceneQuery(scene).view, MotionPlanner(scene)
+    goal = np.array([-0.7, -1.2, 0.9])
+    plan = planner.plan_arm(view, goal, quat=(0.7071, 0.0, 0.7071, 0.0))
+    assert plan.reason == "" and plan.names[0] == "fetch_torso_lift_joint"
+    model = planner._any_body.model
+    pos, _ = model.hand(plan.joints[-1:])
+    np.testing.assert_allclose(pos[0] + (-1.4, -1.2, 0.0), goal, atol=0.02)
+    low, high = model.chain.lower, model.chain.upper
+    assert (plan.joints >= low - 1e-5).all() and (plan.joints <= high + 1e-5).all()
+    assert planner.plan_arm(view, (3.0, 0.0, 0.5)).reason == "no_base"
+    assert planner.plan_arm(view, (-0.7, -1.2, -0.05), quat=(0.7071, 0.0, 0.7071, 0.0)).reason in (
+        "no_grasp",
+        "no_base",
+    )

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from ig2mj.planning.bodies import hand_spheres
 from ig2mj.planning.clearance import HELD, Obstacles
 from ig2mj.planning.grasps import GraspPose, ordered, sides
 from ig2mj.planning.hand_search import search_way
-from ig2mj.planning.bodies import hand_spheres
 
 
 class Wall(Obstacles):

@@ -7,7 +7,7 @@ import ig2mj
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.planning import execution
-from ig2mj.planning.bodies import body_of
+from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles, hand_way, straight
 from ig2mj.planning.driving import drive
 from ig2mj.planning.footprint import BaseFootprint, Disc

@@ -3,6 +3,7 @@
 import pytest
 
 import ig2mj
+from ig2mj.agents.fetch import Fetch
 from ig2mj.agents.humanoid import Humanoid
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.errors import EngineError, UnknownNameError
@@ -42,6 +43,15 @@ def test_the_humanoid_cuts_an_apple_and_opens_a_cabinet(tiny_home_folder):
     simulation = simulation_of(tiny_home_folder, Humanoid().at(-1.4, -1.2, 0.0), grasping="assisted")
     done(simulation, "grasp knife", "slice apple knife", "release knife", "open cabinet")
     assert simulation.predicate("sliced", "apple") and simulation.predicate("open", "cabinet")
+
+
+@pytest.mark.slow
+def test_fetch_takes_an_apple_in_its_gripper_and_lets_it_go(tiny_home_folder):
+    simulation = simulation_of(tiny_home_folder, Fetch().at(-1.4, -1.2, 0.0), grasping="assisted")
+    done(simulation, "grasp apple")
+    assert simulation.agent.facts.held == ("apple",)
+    done(simulation, "release apple")
+    assert simulation.agent.facts.held == ()
 
 
 @pytest.mark.slow

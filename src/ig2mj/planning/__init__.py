@@ -8,11 +8,11 @@ from ig2mj.planning.batch_agent import BatchAgent
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.kinematic import KinematicRung
-from ig2mj.planning.motion_planner import BasePlan, HandPlan, MotionPlanner
+from ig2mj.planning.motion_planner import ArmPlan, BasePlan, HandPlan, MotionPlanner
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.problem import Problem, problem_of
 from ig2mj.planning.solver import EpisodeResult, StepRecord, solve, summary
-from ig2mj.planning.steps import PRIMITIVES, REASONS, Outcome, PlanningError, Step, make_step
+from ig2mj.planning.steps import PRIMITIVES, REASONS, Outcome, PlanningError, Step, UnsupportedPrimitive, make_step
 from ig2mj.planning.symbolic import SymbolicRung
 from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
 from ig2mj.process.public_names import offer_modules
@@ -20,6 +20,7 @@ from ig2mj.process.public_names import offer_modules
 __all__ = [
     "PRIMITIVES",
     "REASONS",
+    "ArmPlan",
     "BasePlan",
     "BatchAgent",
     "Domain",
@@ -37,6 +38,7 @@ __all__ = [
     "SymbolicRung",
     "TaskPlan",
     "TaskPlanner",
+    "UnsupportedPrimitive",
     "make_step",
     "problem_of",
     "solve",

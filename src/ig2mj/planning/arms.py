@@ -44,6 +44,7 @@ from ig2mj.geometry.poses import quat_to_rotation_vector as rotation_vector
 from ig2mj.geometry.poses import rotation_vector_to_quat as from_rotation_vector
 from ig2mj.planning.bodies import Direction, Rows, Senses, WheeledBody, goals_of_hand, grip_of
 from ig2mj.planning.clearance import HELD, Obstacles
+from ig2mj.planning.hand_search import connect
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.scene.scene import Scene
 
@@ -427,6 +428,51 @@ class ArmFollower:
         return self._obstacles.clear(np.column_stack([centres, spheres[:, 3]]))
 
 
+JOINT_STRIDE, JOINT_STEP, JOINT_SAMPLES = 0.6, 0.06, 300
+"""rad or m: by which a tree of postures grows at once, and between postures that are checked; postures sampled."""
+
+
+class ArmWay:
+    """Ways of an arm, with its hand, from one posture to others, where the base stands; see `connect`."""
+
+    def __init__(
+        self,
+        model: ArmModel,
+        links: LinkSpheres,
+        base: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4"]],
+        obstacles: Obstacles,
+    ):
+        """links: with the hand. base: position and orientation, world frame."""
+        self._model, self._links, self._base, self._obstacles = model, links, base, obstacles
+
+    def is_clear(self, joints: Float[np.ndarray, "N J"]) -> bool:
+        """Whether nothing meets the arm in any of some postures."""
+        spheres, (pos, quat) = self._links.placed(joints), self._base
+        centres = np.asarray(quat_rotate(np.broadcast_to(quat, (len(spheres), 4)), spheres[:, :3]), float) + pos
+        return self._obstacles.clear(np.column_stack([centres, spheres[:, 3]]))
+
+    def _free(self, one: np.ndarray, other: np.ndarray) -> bool:
+        count = int(np.ceil(float(np.abs(other - one).max()) / JOINT_STEP)) + 1
+        return self.is_clear(one + np.linspace(0.0, 1.0, count)[:, None] * (other - one))
+
+    def find(
+        self, q: Float[np.ndarray, "J"], goals: Float[np.ndarray, "n J"], samples: int, seed: int
+    ) -> tuple[Float[np.ndarray, "N J"] | None, str]:
+        """Postures of a way to one of some, the first is q, and the method that found it: "straight" or "rrt_connect".
+        None: none was found."""
+        for goal in goals:
+            if self._free(q, goal):
+                return np.stack([q, goal]), "straight"
+        chain = self._model.chain
+        for goal in goals[:2]:
+            low = np.where(np.isfinite(chain.lower), chain.lower, np.minimum(q, goal) - np.pi / 2)
+            high = np.where(np.isfinite(chain.upper), chain.upper, np.maximum(q, goal) + np.pi / 2)
+            way = connect(self._free, q, goal, low, high, JOINT_STRIDE, samples, seed)
+            if way is not None:
+                return np.stack(way), "rrt_connect"
+        return None, ""
+
+
 class LinkSpheres:
     """Spheres of an arm's links, without its hand, in the frame of the robot's base.
 
@@ -434,7 +480,8 @@ class LinkSpheres:
       bodies: of the scene, that the arm moves, the hand among them. trunk: m, radius and height of the rest.
     """
 
-    def __init__(self, scene: Scene, agent: int, arm: ArmModel):
+    def __init__(self, scene: Scene, agent: int, arm: ArmModel, with_hand: bool = False):
+        """with_hand: the hand counts, too."""
         model, tables, name = scene.model, scene.tables, scene.tables.agent_names[agent]
         self._data, self._model = scene.start_data(), model
         joints = [model.joint(tables.agent_joint_names[j]) for j in arm.joints]
@@ -445,7 +492,7 @@ class LinkSpheres:
         self.bodies: Int[np.ndarray, "n"] = np.array([b for b in mine if _below(model, int(b), root)])
         self._base = model.body(name).id
         hand = tables.body_hand[self.bodies] >= 0
-        links = set(self.bodies[~hand].tolist()) - {root}
+        links = set(self.bodies[~hand | with_hand].tolist()) - {root}
         collides = (model.geom_contype | model.geom_conaffinity) != 0
         geoms = [g for g in np.flatnonzero(collides) if int(model.geom_bodyid[g]) in links]
         self._geoms = [(int(g), geom_spheres(model, int(g), LINK_SPACING, LINK_RADIUS)) for g in geoms]

@@ -31,7 +31,6 @@ from ig2mj.geometry.host_rotations import (
 )
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.phases import Base, Phase
-from ig2mj.planning.steps import PlanningError
 from ig2mj.scene.scene import Scene
 
 AHEAD = 0.35
@@ -115,23 +114,6 @@ class Body(Protocol):
     def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
         """The controller's action of the present phases."""
         ...
-
-
-def body_of(scene: Scene, controller: Controller, agent: int = 0) -> Body:
-    """How programs move a robot of a scene.
-
-    Raises:
-      PlanningError: its base neither hovers nor drives.
-    """
-    names = tuple(controller.action_names)
-    if "body_x" in names:
-        return HoveringBody(scene, controller, agent)
-    if {"forward", "turn_left"} <= set(names):
-        from ig2mj.planning.arms import ArmBody, model_of_arm
-
-        model = model_of_arm(scene, controller, agent)
-        return WheeledBody(scene, controller, agent) if model is None else ArmBody(scene, controller, agent, model)
-    raise PlanningError(f"robot '{scene.tables.agent_names[agent]}' has no base that planned ways can move")
 
 
 @runtime_checkable

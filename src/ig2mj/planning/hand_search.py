@@ -7,6 +7,7 @@ that the same world gives the same way.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
@@ -36,19 +37,38 @@ def search_way(
     if not (free(start, start + 1e-4) and free(goal, goal + 1e-4)):
         return None
     low, high = np.minimum(start, goal) - AROUND, np.maximum(start, goal) + AROUND
-    rng = np.random.default_rng(0)
+    way = connect(free, start, goal, low, high)
+    return None if way is None else way[1:]
+
+
+def connect(
+    free: Callable[[np.ndarray, np.ndarray], bool],
+    start: Float[np.ndarray, "n"],
+    goal: Float[np.ndarray, "n"],
+    low: Float[np.ndarray, "n"],
+    high: Float[np.ndarray, "n"],
+    stride: float = STRIDE,
+    samples: int = SAMPLES,
+    seed: int = 0,
+) -> list[np.ndarray] | None:
+    """RRT-Connect: points of a way between two free points of a space, the start first; None: none was found.
+
+    Args:
+      free: whether a straight line is. low, high: bounds of the points that are sampled. stride: of a tree, at once.
+    """
+    rng = np.random.default_rng(seed)
     grown, other = _Tree([start], [-1]), _Tree([goal], [-1])
-    for _ in range(SAMPLES):
+    for _ in range(samples):
         aim = rng.uniform(low, high)
-        new = grown.extend(aim, free)
+        new = grown.extend(aim, free, stride)
         if new is not None:
             at = other.nearest(new)
-            while (met := other.extend(new, free, at)) is not None:
+            while (met := other.extend(new, free, stride, at)) is not None:
                 at = len(other.points) - 1
                 if np.linalg.norm(met - new) < 1e-6:
                     ways = grown.back(len(grown.points) - 1), other.back(at)
                     one, two = ways if np.array_equal(grown.points[0], start) else ways[::-1]
-                    return _shortened([*one[::-1], *two[1:]], free, rng)[1:]
+                    return _shortened([*one[::-1], *two[1:]], free, rng)
         grown, other = other, grown
     return None
 
@@ -61,14 +81,14 @@ class _Tree:
     def nearest(self, point: Vector) -> int:
         return int(np.argmin(np.linalg.norm(np.array(self.points) - point, axis=1)))
 
-    def extend(self, aim: Vector, free, at: int | None = None) -> Vector | None:
-        """A new point at most `STRIDE` nearer to an aim; None: the way there is not free."""
+    def extend(self, aim: Vector, free, stride: float, at: int | None = None) -> Vector | None:
+        """A new point at most `stride` nearer to an aim; None: the way there is not free."""
         near = self.nearest(aim) if at is None else at
         way = aim - self.points[near]
         apart = float(np.linalg.norm(way))
         if apart < 1e-9:
             return None
-        new = aim if apart <= STRIDE else self.points[near] + STRIDE / apart * way
+        new = aim if apart <= stride else self.points[near] + stride / apart * way
         if not free(self.points[near], new):
             return None
         self.points.append(new)

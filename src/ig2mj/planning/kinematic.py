@@ -24,7 +24,8 @@ from ig2mj.engine.snapshot import Snapshot, fitted
 from ig2mj.engine.view import PhysicsView
 from ig2mj.engine.writes import joints
 from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
-from ig2mj.planning.bodies import HoveringBody, Senses, body_of
+from ig2mj.planning.bodies import HoveringBody, Senses
+from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.motion_planner import MotionPlanner

@@ -19,9 +19,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import PhysicsView
-from ig2mj.geometry.host_rotations import quat_rotate
+from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_rotate
 from ig2mj.install_hint import pip_install_extra
-from ig2mj.planning.bodies import HoveringBody, body_of, grip_of, sense
+from ig2mj.planning.arms import JOINT_SAMPLES, ArmBody, ArmWay, LinkSpheres
+from ig2mj.planning.bodies import Body, HoveringBody, grip_of, sense
+from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles, PlacedPieces
 from ig2mj.planning.footprint import BaseFootprint
 from ig2mj.planning.hand_collision import HandCollision
@@ -84,6 +86,25 @@ class HandPlan:
     points: Float[np.ndarray, "N 3"]
     quats: Float[np.ndarray, "N 4"]
     length: float = 0.0
+    reason: str = ""
+    detail: str = ""
+    method: str = ""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ArmPlan:
+    """A way of an arm, or why there is none.
+
+    Attributes:
+      joints: [N, J] rad or m, of the joints `names`, in straight lines; the first is where they are.
+      names: of the joints, from the base to the hand, as the scene names them.
+      reason: "" for a way, "no_base": no posture brings the hand there from where the base stands, "no_grasp": in none
+        of them the arm has room, "no_path": no way leads there.
+      detail: the reason in words. method: "straight" or "rrt_connect".
+    """
+
+    joints: Float[np.ndarray, "N J"]
+    names: tuple[str, ...]
     reason: str = ""
     detail: str = ""
     method: str = ""
@@ -277,17 +298,19 @@ class MotionPlanner:
         return BasePlan(way, yaw, length)
 
     @functools.cached_property
+    def _any_body(self) -> Body:
+        robot: Any = self.scene.agents[self.agent]
+        return body_of(self.scene, robot.controller(self.scene.tables, self.agent), self.agent)
+
+    @functools.cached_property
     def _body(self) -> HoveringBody:
         """How the robot moves its hands."""
-        robot: Any = self.scene.agents[self.agent]
-        name = self.scene.tables.agent_names[self.agent]
-        body = body_of(self.scene, robot.controller(self.scene.tables, self.agent), self.agent)
+        name, body = self.scene.tables.agent_names[self.agent], self._any_body
         if not len(body.hands):
             raise PlanningError(f"robot '{name}' has no hands")
         if not isinstance(body, HoveringBody):
             raise PlanningError(
-                f"the hands of robot '{name}' are on arms, for which no motion is planned (take the humanoid, whose "
-                "hands float)"
+                f"the hand of robot '{name}' is on an arm: plan_arm plans its motion (the humanoid's hands float)"
             )
         return body
 
@@ -352,13 +375,63 @@ class MotionPlanner:
         owner = int(tables.geom_object[geom])
         return tables.object_names[owner] if owner >= 0 else "the robot itself"
 
-    def plan_arm(self, view: PhysicsView, goal: Sequence[float] | np.ndarray, **options: Any) -> HandPlan:
-        """`plan_hand` of a hand that floats; motion of arms is not planned.
+    @functools.cached_property
+    def _links(self) -> LinkSpheres:
+        body = self._any_body
+        assert isinstance(body, ArmBody)
+        return LinkSpheres(self.scene, self.agent, body.model, with_hand=True)
+
+    def plan_arm(
+        self,
+        view: PhysicsView,
+        goal: Sequence[float] | np.ndarray,
+        *,
+        quat: Sequence[float] | np.ndarray | None = None,
+        without: Collection[int] = (),
+        world: int = 0,
+        samples: int = JOINT_SAMPLES,
+        seed: int = 0,
+    ) -> ArmPlan:
+        """A way of an arm, and of its open hand, in the space of its joints; the base stays where it is.
+
+        Inverse kinematics begin at several postures. The straight way to each posture is tried, then RRT-Connect.
+
+        Args:
+          view: with a world axis; `world` of it is planned in. goal: x, y and z of the grasp point, m, world frame.
+          quat: orientation of the palm at the goal, w-x-y-z, world frame; None: as it is.
+          without: numbers of objects that do not count, such as what the hand is about to take hold of.
+          samples, seed: of RRT-Connect: postures that are sampled before it gives up, and its random numbers.
+
+        Returns:
+          The way; `ArmPlan.reason` says why there is none.
 
         Raises:
-          PlanningError: the hand is on an arm.
+          PlanningError: the robot has no arm that is planned.
         """
-        return self.plan_hand(view, goal, **options)
+        body, tables = self._any_body, self.scene.tables
+        name = tables.agent_names[self.agent]
+        if not isinstance(body, ArmBody):
+            lacks = "float: plan_hand plans their motion" if isinstance(body, HoveringBody) else "are on no planned arm"
+            raise PlanningError(f"the hands of robot '{name}' {lacks}")
+        senses = sense(view, self.agent, body.hands)
+        base = senses.base_pos[world].astype(float), senses.base_quat[world].astype(float)
+        q = np.asarray(view.agent.joint_pos)[world, body.model.joints].astype(float)
+        end = np.asarray(goal, float)
+        last = senses.hand_quat[world, 0].astype(float) if quat is None else np.asarray(quat, float)
+        own = np.asarray(quat_rotate(quat_conjugate(base[1]), end - base[0]), float)
+        here = ArmPlan(q[None], tuple(tables.agent_joint_names[j] for j in body.model.joints))
+        said = f"({end[0]:.2f}, {end[1]:.2f}, {end[2]:.2f}) m"
+        goals = body.model.solve(own, np.asarray(quat_multiply(quat_conjugate(base[1]), last)), q)
+        if not len(goals):
+            return dataclasses.replace(here, reason="no_base", detail=f"no posture brings the hand to {said}")
+        way = ArmWay(body.model, self._links, base, self.obstacles(view, without, world))
+        goals = np.array([g for g in goals if way.is_clear(g[None])])
+        if not len(goals):
+            return dataclasses.replace(here, reason="no_grasp", detail=f"the arm has no room with its hand at {said}")
+        found, method = way.find(q, goals, samples, seed)
+        if found is None:
+            return dataclasses.replace(here, reason="no_path", detail=f"the arm has no way to {said}")
+        return dataclasses.replace(here, joints=found, method=method)
 
     def _blocked(
         self,

@@ -17,7 +17,8 @@ from ig2mj.agents.humanoid.robot import Humanoid
 from ig2mj.agents.registry import find_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.planning import execution
-from ig2mj.planning.bodies import HandedBody, body_of
+from ig2mj.planning.bodies import HandedBody
+from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.motion_planner import MotionPlanner
@@ -25,7 +26,7 @@ from ig2mj.planning.moves import Primitive, Program
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.primitives import primitive
 from ig2mj.planning.stage import Stage
-from ig2mj.planning.steps import Outcome, PlanningError, Step
+from ig2mj.planning.steps import Outcome, PlanningError, Step, UnsupportedPrimitive
 from ig2mj.planning.world import PlannedWorld
 from ig2mj.sampling.query import SceneQuery
 
@@ -96,12 +97,12 @@ class PhysicsRung:
         """Whether the robot can be asked for a primitive.
 
         Raises:
-          UnknownNameError: no such object or room. PlanningError: the robot lacks what the primitive takes.
+          UnknownNameError: no such object or room. UnsupportedPrimitive: the robot lacks what the primitive takes.
         """
         if step.primitive != "navigate_to" and not isinstance(self.body, HandedBody):
             name = self.stage.scene.tables.agent_names[self.stage.agent]
             lacks = "has no hand" if not len(self.body.hands) else "has no hand whose motion can be planned"
-            raise PlanningError(f"robot '{name}' {lacks}: '{step.primitive}' takes one (humanoid has two)")
+            raise UnsupportedPrimitive(f"robot '{name}' {lacks}: '{step.primitive}' takes one (humanoid has two)")
         rooms = self.domain.model.tables.room_names
         for name in step.arguments:
             if name not in rooms:

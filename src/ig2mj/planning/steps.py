@@ -27,6 +27,10 @@ class PlanningError(Ig2mjError):
     """A goal that cannot be planned for, or a request that no primitive of the robot can carry out."""
 
 
+class UnsupportedPrimitive(PlanningError):
+    """A primitive that the robot lacks something for, which the error names."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Primitive:
     """One primitive.

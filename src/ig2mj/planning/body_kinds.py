@@ -1,0 +1,24 @@
+"""Which class of `ig2mj.planning.bodies` moves a robot (`body_of`)."""
+
+from __future__ import annotations
+
+from ig2mj.agents.base import Controller
+from ig2mj.planning.arms import ArmBody, model_of_arm
+from ig2mj.planning.bodies import Body, HoveringBody, WheeledBody
+from ig2mj.planning.steps import PlanningError
+from ig2mj.scene.scene import Scene
+
+
+def body_of(scene: Scene, controller: Controller, agent: int = 0) -> Body:
+    """How programs move a robot of a scene.
+
+    Raises:
+      PlanningError: its base neither hovers nor drives.
+    """
+    names = tuple(controller.action_names)
+    if "body_x" in names:
+        return HoveringBody(scene, controller, agent)
+    if {"forward", "turn_left"} <= set(names):
+        model = model_of_arm(scene, controller, agent)
+        return WheeledBody(scene, controller, agent) if model is None else ArmBody(scene, controller, agent, model)
+    raise PlanningError(f"robot '{scene.tables.agent_names[agent]}' has no base that planned ways can move")
