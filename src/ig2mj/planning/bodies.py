@@ -140,8 +140,8 @@ class HandedBody(Body, Protocol):
       trunk: m, radius and height of the upright body that what is held keeps clear of.
       resting: m, heights of empty hands at rest, and how far from the axis they reach; None: the footprint has them.
       arm: bodies, of the scene, that move with the hands and do not count where the robot stands.
-      rises: m by which the body stoops, and stretches, for what its hands do not reach otherwise. tucked: [H, 3] m, where
-        empty hands are in narrow places; None: as they are.
+      rises: m by which the body stoops, and stretches, for what its hands do not reach otherwise.
+      tucked: [H, 3] m, where empty hands are in narrow places; None: as they are.
       opening: m between the fingers of a gripper; None: a hand that takes hold with its palm.
     """
 
