@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator
 import numpy as np
 from jaxtyping import Float
 
-from ig2mj.planning.bodies import HandedBody
+from ig2mj.planning.bodies import HandedBody, HoveringBody
 from ig2mj.planning.motion_planner import NEAR_START, FreeFloor, Point
 from ig2mj.planning.moves import Primitive, Program, free_hand
 from ig2mj.planning.occupancy import door_objects

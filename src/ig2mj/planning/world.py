@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
+from ig2mj.agents.humanoid.frames import BODY_HEIGHT
+from ig2mj.agents.humanoid.robot import BODY_RADIUS
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.host_rotations import matrix_to_quat, quat_conjugate, quat_multiply
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.bodies import ALONG, Follower, HandedBody, Senses, grip_of, sense
+from ig2mj.planning.bodies import ALONG, CORNER, Follower, HandedBody, Senses, grip_of, sense
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
