@@ -10,25 +10,20 @@ Axes: W worlds, J joints of the arm, N postures, P points of a way, T agent step
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from ig2mj.agents.base import ACTION_PERIOD, Controller
-from ig2mj.agents.fetch.controller import AHEAD, EASE, GAIN, POSTURE, FetchController
-from ig2mj.agents.fetch.figures import CHAIN, CHAIN_JOINTS, VELOCITY
+from ig2mj.agents.fetch.controller import GAIN, FetchController
 from ig2mj.agents.fetch.robot import HAND as FETCH_HAND
-from ig2mj.agents.kinematics import Chain, forward, inverse
+from ig2mj.agents.kinematics import Chain, forward
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.agents.urdf.controller import UrdfController
 from ig2mj.agents.urdf.robot import UrdfRobot
-from ig2mj.engine.view import Array
 from ig2mj.geometry.host_rotations import (
     length,
     matrix_to_quat,
@@ -38,219 +33,18 @@ from ig2mj.geometry.host_rotations import (
     quat_rotate_inverse,
     quat_to_rotation_vector,
 )
-from ig2mj.geometry.poses import quat_conjugate as conjugate
-from ig2mj.geometry.poses import quat_multiply as multiply
-from ig2mj.geometry.poses import quat_to_rotation_vector as rotation_vector
-from ig2mj.geometry.poses import rotation_vector_to_quat as from_rotation_vector
+from ig2mj.planning.arm_links import LinkSpheres, geom_spheres
+from ig2mj.planning.arm_model import FASTEST, PULL, TURN_FASTEST, ArmModel
 from ig2mj.planning.bodies import Direction, Rows, Senses, WheeledBody, goals_of_hand, grip_of
 from ig2mj.planning.clearance import HELD, Obstacles
-from ig2mj.planning.hand_search import connect
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.scene.scene import Scene
-
-PULL = 0.5
-"""Share of what is left that a hand is asked to move and turn by in an agent step."""
-
-FASTEST, TURN_FASTEST = 0.04, 0.09
-"""m and rad in an agent step that a hand on an arm is asked to move and turn by at most."""
-
-SEEDS, ITERATIONS = 8, 24
-"""Postures at which inverse kinematics begin, and their steps."""
-
-OFF, TURNED_OFF = 0.015, 0.12
-"""m and rad from a pose within which a posture counts for it."""
-
-POINTS, STEPS = 8, 160
-"""Points of a way, and agent steps, for which following it is compiled; longer ways are followed in parts."""
-
-NEAR, TURNED_NEAR = 0.03, 0.2
-"""m and rad from a point of a way at which the next one is gone for, and within which the end has to be reached."""
 
 EVERY = 4
 """Agent steps between the postures of a way whose links are checked."""
 
-LINK_SPACING, LINK_RADIUS = 0.06, 0.025
-"""m: between the middles of spheres in a link that is not round, and their radius at least."""
-
-SLACK = 0.015
-"""m by which links may seem to enter what is there: spheres are larger than links."""
-
 ASIDE = 0.6
 """m that a base would like to be from what its arm does; less than the arm's reach by half."""
-
-
-class ArmModel:
-    """The joints of one arm as its controller moves them, in the frame of the robot's base.
-
-    Attributes:
-      chain: to the hand. joints: numbers of its joints among those of all robots. rest: their positions at rest.
-      offset, turn: from the chain's tip to the hand: grasp point (m) and orientation (w-x-y-z) in the tip's frame.
-    """
-
-    def __init__(
-        self,
-        chain: Chain,
-        joints: Int[np.ndarray, "J"],
-        rest: Float[np.ndarray, "J"],
-        ease: Float[np.ndarray, "J"],
-        speed: Float[np.ndarray, "J"],
-        shares: tuple[float, float],
-        posture: float,
-    ):
-        """speed: rad/s or m/s, largest. shares: of a displacement that inverse kinematics solve, and of that to their
-        solution that an agent step makes. posture: pull to `rest`."""
-        self.chain, self.joints, self.rest = chain, joints, np.asarray(rest, np.float32)
-        self.offset, self.turn = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-        self._ease, self._speed, self._shares, self._posture = ease, speed, shares, posture
-        self.step: Callable[..., Any] = jax.jit(self._step)
-        self._follow = jax.jit(self._follow_steps)
-        self._solve = jax.jit(self._solve_seeds)
-
-    def calibrate(
-        self, data: Any, base: int, palm: int, grip: Float[np.ndarray, "3"], q: Float[np.ndarray, "J"]
-    ) -> None:
-        """Takes `offset` and `turn` from a compiled scene in which the joints are at q."""
-        turn = data.xmat[base].reshape(3, 3)
-        at = turn.T @ (data.xpos[palm] + data.xmat[palm].reshape(3, 3) @ grip - data.xpos[base])
-        quat = matrix_to_quat(turn.T @ data.xmat[palm].reshape(3, 3))
-        tip, tip_quat, _ = (np.asarray(v, float)[0] for v in forward(self.chain, jnp.asarray(q[None], jnp.float32)))
-        self.offset = np.asarray(quat_rotate_inverse(tip_quat, at - tip), float)
-        self.turn = np.asarray(quat_multiply(quat_conjugate(tip_quat), quat), float)
-
-    def hand(self, q: Float[np.ndarray, "N J"]) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 4"]]:
-        """Grasp point and orientation of the hand, in the base's frame."""
-        pos, quat = self._hand(jnp.asarray(q, jnp.float32))
-        return np.asarray(pos, float), np.asarray(quat, float)
-
-    def _hand(self, q: Array) -> tuple[Array, Array]:
-        tip, quat, _ = forward(self.chain, q)
-        return self._of_tip(tip, quat)
-
-    def _of_tip(self, tip: Array, quat: Array) -> tuple[Array, Array]:
-        from ig2mj.geometry.poses import quat_rotate as rotate
-
-        offset = jnp.broadcast_to(jnp.asarray(self.offset, jnp.float32), tip.shape)
-        turn = jnp.broadcast_to(jnp.asarray(self.turn, jnp.float32), quat.shape)
-        return tip + rotate(quat, offset), multiply(quat, turn)
-
-    def _tip_of(self, pos: Array, quat: Array) -> tuple[Array, Array]:
-        from ig2mj.geometry.poses import quat_rotate as rotate
-
-        back = jnp.broadcast_to(jnp.asarray(quat_conjugate(self.turn), jnp.float32), quat.shape)
-        tip_quat = multiply(quat, back)
-        offset = jnp.broadcast_to(jnp.asarray(self.offset, jnp.float32), pos.shape)
-        return pos - rotate(tip_quat, offset), tip_quat
-
-    def _step(self, q: Array, move: Array, turn: Array) -> Array:
-        """Joints after an agent step in which the hand is asked to move (m) and turn (rad), base's frame."""
-        solved, made = self._shares
-        pos, quat = self._hand(q)
-        scale = solved / made
-        goal = self._tip_of(pos + scale * move, multiply(from_rotation_vector(scale * turn), quat))
-        found = inverse(self.chain, q, *goal, self.rest, posture=self._posture, ease=self._ease)
-        change = made / solved * (found - q)
-        change = change / jnp.maximum(1.0, jnp.max(jnp.abs(change) / (self._speed * ACTION_PERIOD), -1, keepdims=True))
-        return jnp.clip(q + change, jnp.asarray(self.chain.lower, q.dtype), jnp.asarray(self.chain.upper, q.dtype))
-
-    def _follow_steps(self, q: Array, points: Array, quats: Array) -> tuple[Array, Array]:
-        """[T, J] joints and [T] number of the point that is gone for; points [P, 3], quats [P, 4]."""
-
-        def step(carry: tuple[Array, Array], _: None) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-            q, k = carry
-            at = jnp.minimum(k, POINTS - 1)
-            pos, quat = self._hand(q)
-            move, turn = points[at] - pos, rotation_vector(multiply(quats[at], conjugate(quat)))
-            far, angle = jnp.linalg.norm(move), jnp.linalg.norm(turn)
-            there = (far < NEAR) & ((angle < TURNED_NEAR) | (at < POINTS - 1))
-            move = PULL * move * jnp.minimum(1.0, FASTEST / jnp.maximum(PULL * far, 1e-6))
-            turn = PULL * turn * jnp.minimum(1.0, TURN_FASTEST / jnp.maximum(PULL * angle, 1e-6))
-            new = self._step(q, move, turn)
-            return (jnp.where(k < POINTS, new, q), jnp.where(there, k + 1, k)), (q, k)
-
-        (_, _), found = jax.lax.scan(step, (q, jnp.int32(0)), None, length=STEPS)
-        return found
-
-    def follow(
-        self, q: Float[np.ndarray, "J"], points: Float[np.ndarray, "P 3"], quats: Float[np.ndarray, "P 4"]
-    ) -> Float[np.ndarray, "T J"] | None:
-        """Joints while the hand goes along points, base's frame; None: it does not get to the last one."""
-        parts = []
-        for first in range(0, len(points), POINTS):
-            some, turned = points[first : first + POINTS], quats[first : first + POINTS]
-            lack = POINTS - len(some)
-            some = np.concatenate([np.tile(some[:1], (lack, 1)), some]).astype(np.float32)
-            turned = np.concatenate([np.tile(turned[:1], (lack, 1)), turned]).astype(np.float32)
-            joints, number = (np.asarray(a) for a in self._follow(jnp.asarray(q, jnp.float32), some, turned))
-            if number[-1] < POINTS:
-                return None
-            parts.append(joints[: int(np.argmax(number >= POINTS)) + 1].astype(float))
-            q = parts[-1][-1]
-        return np.concatenate(parts)
-
-    @functools.cached_property
-    def _seeds(self) -> Float[np.ndarray, "N J"]:
-        rng = np.random.default_rng(0)
-        low, high = (np.where(np.isfinite(v), v, s * np.pi) for v, s in ((self.chain.lower, -1), (self.chain.upper, 1)))
-        found = low + (high - low) * (0.1 + 0.8 * rng.random((SEEDS, len(self.rest))))
-        found[0] = self.rest
-        return found.astype(np.float32)
-
-    def _solve_seeds(self, seeds: Array, pos: Array, quat: Array) -> tuple[Array, Array, Array]:
-        goal = self._tip_of(jnp.broadcast_to(pos, (SEEDS, 3)), jnp.broadcast_to(quat, (SEEDS, 4)))
-        q = inverse(self.chain, seeds, *goal, self.rest, iterations=ITERATIONS, posture=0.0)
-        at, turned = self._hand(q)
-        return (
-            q,
-            jnp.linalg.norm(at - pos, axis=-1),
-            jnp.linalg.norm(
-                rotation_vector(multiply(jnp.broadcast_to(quat, turned.shape), conjugate(turned))), axis=-1
-            ),
-        )
-
-    def solve(
-        self, pos: Float[np.ndarray, "3"], quat: Float[np.ndarray, "4"], near: Float[np.ndarray, "J"] | None = None
-    ) -> Float[np.ndarray, "n J"]:
-        """Postures with the hand at a pose of the base's frame, the nearest to `near` (None: rest) first."""
-        seeds = self._seeds if near is None else np.concatenate([[near], self._seeds[1:]]).astype(np.float32)
-        q, off, turned = (
-            np.asarray(a, float) for a in self._solve(seeds, pos.astype(np.float32), np.asarray(quat, np.float32))
-        )
-        found = q[(off < OFF) & (turned < TURNED_OFF)]
-        return found[np.argsort(np.abs(found - (self.rest if near is None else near)).max(1))]
-
-
-def model_of_arm(scene: Scene, controller: Controller, agent: int) -> ArmModel | None:
-    """That of a robot's arm; None: it has none with a hand, or its controller moves it in no known way."""
-    tables, name = scene.tables, scene.tables.agent_names[agent]
-    hands = np.flatnonzero(tables.hand_agent == agent)
-    if len(hands) != 1:
-        return None
-    if isinstance(controller, FetchController):
-        names = [f"{name}_{n}" for n in _FETCH_NAMES]
-        joints = np.array([tables.agent_joint_names.index(n) for n in names])
-        rest = controller.rest[CHAIN_JOINTS]
-        model = ArmModel(CHAIN, joints, rest, EASE, VELOCITY[CHAIN_JOINTS], (AHEAD, GAIN * ACTION_PERIOD), POSTURE)
-    elif isinstance(controller, UrdfController) and controller.arms and controller.arms[0] is not None:
-        arm = controller.arms[0]
-        names = [f"{name}_{n}" for n in arm.names]
-        joints = np.array([tables.agent_joint_names.index(n) for n in names])
-        model = ArmModel(arm.chain, joints, arm.rest, np.ones(len(joints)), arm.speed, (1.0, 1.0), 0.0)
-    else:
-        return None
-    robot = scene.agents[agent]
-    assert isinstance(robot, TaskRobot)
-    data = scene.start_data()
-    q = np.array([data.qpos[scene.model.joint(n).qposadr[0]] for n in names])
-    mujoco.mj_kinematics(scene.model, data)
-    palm, base = int(tables.hand_body[hands[0]]), scene.model.body(name).id
-    model.calibrate(data, base, palm, np.asarray(robot.hand_rays()[0].grasp_point, float), q)
-    return model
-
-
-_FETCH_NAMES = (
-    *("torso_lift_joint", "shoulder_pan_joint", "shoulder_lift_joint", "upperarm_roll_joint", "elbow_flex_joint"),
-    *("forearm_roll_joint", "wrist_flex_joint", "wrist_roll_joint"),
-)
 
 
 class ArmBody(WheeledBody):
@@ -428,129 +222,6 @@ class ArmFollower:
         return self._obstacles.clear(np.column_stack([centres, spheres[:, 3]]))
 
 
-JOINT_STRIDE, JOINT_STEP, JOINT_SAMPLES = 0.6, 0.06, 300
-"""rad or m: by which a tree of postures grows at once, and between postures that are checked; postures sampled."""
-
-
-class ArmWay:
-    """Ways of an arm, with its hand, from one posture to others, where the base stands; see `connect`."""
-
-    def __init__(
-        self,
-        model: ArmModel,
-        links: LinkSpheres,
-        base: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4"]],
-        obstacles: Obstacles,
-    ):
-        """links: with the hand. base: position and orientation, world frame."""
-        self._model, self._links, self._base, self._obstacles = model, links, base, obstacles
-
-    def is_clear(self, joints: Float[np.ndarray, "N J"]) -> bool:
-        """Whether nothing meets the arm in any of some postures."""
-        spheres, (pos, quat) = self._links.placed(joints), self._base
-        centres = np.asarray(quat_rotate(np.broadcast_to(quat, (len(spheres), 4)), spheres[:, :3]), float) + pos
-        return self._obstacles.clear(np.column_stack([centres, spheres[:, 3]]))
-
-    def _free(self, one: np.ndarray, other: np.ndarray) -> bool:
-        count = int(np.ceil(float(np.abs(other - one).max()) / JOINT_STEP)) + 1
-        return self.is_clear(one + np.linspace(0.0, 1.0, count)[:, None] * (other - one))
-
-    def find(
-        self, q: Float[np.ndarray, "J"], goals: Float[np.ndarray, "n J"], samples: int, seed: int
-    ) -> tuple[Float[np.ndarray, "N J"] | None, str]:
-        """Postures of a way to one of some, the first is q, and the method that found it: "straight" or "rrt_connect".
-        None: none was found."""
-        for goal in goals:
-            if self._free(q, goal):
-                return np.stack([q, goal]), "straight"
-        chain = self._model.chain
-        for goal in goals[:2]:
-            low = np.where(np.isfinite(chain.lower), chain.lower, np.minimum(q, goal) - np.pi / 2)
-            high = np.where(np.isfinite(chain.upper), chain.upper, np.maximum(q, goal) + np.pi / 2)
-            way = connect(self._free, q, goal, low, high, JOINT_STRIDE, samples, seed)
-            if way is not None:
-                return np.stack(way), "rrt_connect"
-        return None, ""
-
-
-class LinkSpheres:
-    """Spheres of an arm's links, without its hand, in the frame of the robot's base.
-
-    Attributes:
-      bodies: of the scene, that the arm moves, the hand among them. trunk: m, radius and height of the rest.
-    """
-
-    def __init__(self, scene: Scene, agent: int, arm: ArmModel, with_hand: bool = False):
-        """with_hand: the hand counts, too."""
-        model, tables, name = scene.model, scene.tables, scene.tables.agent_names[agent]
-        self._data, self._model = scene.start_data(), model
-        joints = [model.joint(tables.agent_joint_names[j]) for j in arm.joints]
-        self._qpos = np.array([j.qposadr[0] for j in joints])
-        own = [int(model.jnt_bodyid[j.id]) for j in joints]
-        root = own[int(np.argmin(arm.chain.slides))]
-        mine = np.flatnonzero(tables.body_agent == agent)
-        self.bodies: Int[np.ndarray, "n"] = np.array([b for b in mine if _below(model, int(b), root)])
-        self._base = model.body(name).id
-        hand = tables.body_hand[self.bodies] >= 0
-        links = set(self.bodies[~hand | with_hand].tolist()) - {root}
-        collides = (model.geom_contype | model.geom_conaffinity) != 0
-        geoms = [g for g in np.flatnonzero(collides) if int(model.geom_bodyid[g]) in links]
-        self._geoms = [(int(g), geom_spheres(model, int(g), LINK_SPACING, LINK_RADIUS)) for g in geoms]
-        mujoco.mj_kinematics(model, self._data)
-        rest = [
-            g for g in np.flatnonzero(collides) if int(model.geom_bodyid[g]) in set(mine) - set(self.bodies.tolist())
-        ]
-        turn = self._data.xmat[self._base].reshape(3, 3)
-        radius = height = 0.0
-        for g in rest:
-            box, signs = model.geom_aabb[g], np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
-            corners = (box[:3] + signs * box[3:]) @ self._data.geom_xmat[g].reshape(3, 3).T + self._data.geom_xpos[g]
-            own_corners = (corners - self._data.xpos[self._base]) @ turn
-            round_ = int(model.geom_type[g]) in _ROUND
-            middle = own_corners.mean(0)
-            wide = float(np.hypot(*middle[:2])) + float(model.geom_size[g, 0]) if round_ else None
-            radius = max(radius, wide or float(np.hypot(*own_corners[:, :2].T).max()))
-            height = max(height, float(own_corners[:, 2].max()))
-        self.trunk = (radius, height)
-
-    def placed(self, joints: Float[np.ndarray, "N J"]) -> Float[np.ndarray, "S 4"]:
-        """Spheres of all postures together."""
-        found, data = [], self._data
-        for q in joints:
-            data.qpos[self._qpos] = q
-            mujoco.mj_kinematics(self._model, data)
-            turn, pos = data.xmat[self._base].reshape(3, 3), data.xpos[self._base]
-            for geom, spheres in self._geoms:
-                centres = spheres[:, :3] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
-                found.append(np.column_stack([(centres - pos) @ turn, np.maximum(spheres[:, 3] - SLACK, HELD + 1e-3)]))
-        return np.concatenate(found) if found else np.zeros((0, 4))
-
-
-_ROUND = (int(mujoco.mjtGeom.mjGEOM_SPHERE), int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
-
-
-def geom_spheres(model: mujoco.MjModel, geom: int, spacing: float, radius: float) -> Float[np.ndarray, "S 4"]:
-    """Spheres that cover a geom, in its frame: along the axis of a round one, a lattice in the box of another.
-
-    Args:
-      spacing: m between middles in a box, at most. radius: m, at least.
-    """
-    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
-    if kind in _ROUND:
-        wide = max(float(size[0]), radius)
-        half = 0.0 if kind == int(mujoco.mjtGeom.mjGEOM_SPHERE) else float(size[1])
-        along = np.linspace(-half, half, max(1, int(np.ceil(2 * half / wide)) + 1)) if half > 0 else np.zeros(1)
-        return np.column_stack([np.zeros((len(along), 2)), along, np.full(len(along), wide)])
-    middle, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
-    wide = max(min(float(half.min()), spacing), radius)
-    ranges = []
-    for h in half:
-        inner = max(float(h) - wide, 0.0)
-        ranges.append(np.linspace(-inner, inner, max(1, int(np.ceil(2 * inner / spacing)) + 1)) if inner else [0.0])
-    grid = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 3) + middle
-    return np.column_stack([grid, np.full(len(grid), wide)])
-
-
 def _gripper(
     scene: Scene, agent: int, hand: int, grip: Float[np.ndarray, "3"]
 ) -> tuple[Float[np.ndarray, "3 3"], float, Float[np.ndarray, "S 4"]]:
@@ -588,14 +259,6 @@ def _gripper(
         local = ((centres - pos) @ turn - grip) @ frame
         found.append(np.column_stack([local, own[:, 3]]))
     return frame, opening, np.concatenate(found)
-
-
-def _below(model: mujoco.MjModel, body: int, root: int) -> bool:
-    while body > 0:
-        if body == root:
-            return True
-        body = int(model.body_parentid[body])
-    return False
 
 
 def _columns(chain: Chain) -> tuple[np.ndarray, ...]:

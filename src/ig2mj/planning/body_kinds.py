@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ig2mj.agents.base import Controller
-from ig2mj.planning.arms import ArmBody, model_of_arm
+from ig2mj.planning.arm_model import model_of_arm
+from ig2mj.planning.arms import ArmBody
 from ig2mj.planning.bodies import Body, HoveringBody, WheeledBody
 from ig2mj.planning.steps import PlanningError
 from ig2mj.scene.scene import Scene

@@ -21,7 +21,8 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_rotate
 from ig2mj.install_hint import pip_install_extra
-from ig2mj.planning.arms import JOINT_SAMPLES, ArmBody, ArmWay, LinkSpheres
+from ig2mj.planning.arm_links import JOINT_SAMPLES, ArmWay, LinkSpheres
+from ig2mj.planning.arms import ArmBody
 from ig2mj.planning.bodies import Body, HoveringBody, grip_of, sense
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles, PlacedPieces

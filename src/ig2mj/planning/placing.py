@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.clearance import Obstacles, straight
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp
@@ -175,7 +176,7 @@ def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int)
             palm = world.hand_axes(hand, world.grip_for(hand, name, spot)[2])[1]
             for stance in world.stances(hand, target, floor, world.away(spheres), most=STANCES):
                 lacking = _NO_WAY
-                if world.points_ahead(palm, stance):
+                if points_ahead(world, palm, stance.yaw):
                     seen.append(stance)
                     yield stance, spot
 

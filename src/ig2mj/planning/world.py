@@ -15,6 +15,7 @@ from ig2mj.agents.humanoid.robot import BODY_RADIUS
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.host_rotations import matrix_to_quat, quat_conjugate, quat_multiply
 from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.planning.arm_orientations import ARM_TURNS, level_orientations
 from ig2mj.planning.bodies import ALONG, CORNER, Follower, HandedBody, Senses, grip_of, sense
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
@@ -71,15 +72,6 @@ LATER_SPOTS = 12
 
 TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 """rad about the vertical that an object may be turned by, from how it is held in front of the robot."""
-
-ACROSS = 0.85
-"""Cosine of the angle to where the robot looks beyond which a gripper points across."""
-
-LEVEL = 0.5
-"""Sine of the angle below the horizontal from which on a gripper points down."""
-
-ARM_TURNS = (0.0, *(sign * k * np.pi / 4 for k in (1, 2, 3) for sign in (1, -1)), np.pi)
-"""The same of a hand on an arm, which points about to where the robot looks."""
 
 ORIENTATIONS, ORIENTATION_SPREAD = 2, 1.7
 """Orientations at rest that are tried, and rad by which they may be farther from the present one than the nearest."""
@@ -473,7 +465,7 @@ class PlannedWorld:
         around = self.obstacles([name])
         turned = [(quat, angle) for quat in self._upright(name) for angle in TURNS]
         if self.body.opening is not None:
-            level = self._level(name) if predicate in ("inside", "under") else []
+            level = level_orientations(self, name) if predicate in ("inside", "under") else []
             turned = [(quat, angle) for angle in ARM_TURNS for quat in (*level, *self._upright(name))]
         for quat, angle in turned:
             new = _yawed(quat, angle)
@@ -554,26 +546,6 @@ class PlannedWorld:
         found.sort(key=lambda pair: pair[0])
         kept = [quat for angle, quat in found if angle < found[0][0] + ORIENTATION_SPREAD][:ORIENTATIONS]
         return kept or [now]
-
-    def points_ahead(self, palm: Vector, stance: Stance) -> bool:
-        """Whether a gripper on an arm does not point back to the robot or across it; a floating hand may."""
-        flat = float(np.linalg.norm(palm[:2]))
-        front = about_vertical(stance.yaw)[:, 0]
-        return self.body.opening is None or flat < LEVEL or float(palm @ front) > ACROSS * flat
-
-    def _level(self, name: str) -> list[Float[np.ndarray, "4"]]:
-        """The orientation of an object that a gripper holds from above, if the gripper pointed ahead: there is no room
-        for an arm above most places inside of things. It comes to rest as it falls."""
-        if self.body.opening is None or name not in self.held:
-            return []
-        _, palm = self.hand_axes(self.held.index(name))
-        front = about_vertical(self.base[1])[:, 0]
-        axis = np.cross(palm, front)
-        if palm[2] > -LEVEL or np.linalg.norm(axis) < 1e-6:
-            return []
-        half = np.arccos(np.clip(palm @ front, -1.0, 1.0)) / 2
-        turn = np.concatenate([[np.cos(half)], np.sin(half) * axis / np.linalg.norm(axis)])
-        return [np.asarray(quat_multiply(turn, self.pose(name)[1]), float)]
 
     def _would_hold(self, predicate: str, name: str, where: str, pos: Vector, quat: np.ndarray) -> bool:
         """Whether a placement that does not depend on contact would be true."""
