@@ -26,7 +26,7 @@ WORLDS, SIDE, SEED = 5, 192, 4
 
 def main(folder: pathlib.Path) -> None:
     """Writes randomization_<axis>.jpg into the folder."""
-    axes = ["objects", "materials", "lights", "camera", "sensor_noise"]
+    axes = ["materials", "lights", "camera", "sensor_noise"]
     size = {"width": SIDE, "height": SIDE}
     env = ig2mj.make(
         "CookingMeat", "humanoid", WORLDS, "native", pool_size=8, observations="rgb", sensors=size, randomize=axes
@@ -53,8 +53,6 @@ def main(folder: pathlib.Path) -> None:
         Image.fromarray(np.concatenate(parts, axis=1)).save(folder / f"randomization_{axis}.jpg", quality=88)
 
     batch = coloured(batch, plain)
-    none = jnp.zeros((WORLDS, 3)), jnp.tile(jnp.array([1.0, 0.0, 0.0, 0.0]), (WORLDS, 1))
-    save("objects", shot(batch, Draw(camera_pos=none[0], camera_quat=none[1], camera_slope=jnp.full(WORLDS, 0.25))))
     first = core.engine.export(batch.world.physics, 0)
     states = jax.tree.map(lambda a: np.repeat(np.asarray(a)[:1], WORLDS, 0), batch.world.states)
     batch = core.load(batch, first, states)

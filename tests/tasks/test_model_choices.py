@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-import ig2mj
+from ig2mj.envs.start_choices import varied_models
 from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.scene.library import LibraryModel
 from ig2mj.scene.model_splits import SPLIT_FILE, join_split, models_with_parts
@@ -16,7 +16,9 @@ from ig2mj.scene.scene import load_scene
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.model_choices import choices_of, widened
 from ig2mj.tasks.pools import bare_scene, pool_of
+from ig2mj.tasks.registry import load_task
 from ig2mj.tasks.splits import models_of
+from ig2mj.worlds.randomize import Randomize
 
 
 def test_goals_are_about_whichever_model_is_in_use():
@@ -58,7 +60,7 @@ def test_models_of_the_user_join_a_part_of_their_category(tmp_path, monkeypatch)
 
 def test_only_activities_have_models():
     with pytest.raises(EngineError, match="only the paper's activities have several models"):
-        ig2mj.make("PointNavigation", engine="native", randomize=["objects"])
+        varied_models(load_task("PointNavigation"), Randomize(objects=True), "train")
 
 
 @pytest.mark.slow

@@ -274,6 +274,8 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     control = Control(whole, config.period)
     split, pool_size = start_part(config.split), config.pool_size
     differs = config.randomize
+    if differs is not None:
+        differs.check_finished()
     choices = None if differs is None else varied_models(task, differs, config.split)
     if isinstance(task, NavigationTask):
         setup = setup_navigation(task, body, split, pool_size, control)

@@ -27,7 +27,6 @@ def start_part(split: str) -> str:
 
 def varied_models(task: AnyTask, randomize: Randomize, split: str) -> ModelChoices | None:
     """Models of a task's objects that differ between episodes; None: none do. Raises EngineError: they cannot."""
-    randomize.check_finished()
     varied = randomize.settings("objects")
     if varied is None:
         return None

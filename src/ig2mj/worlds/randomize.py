@@ -168,7 +168,7 @@ AXES: dict[str, type[_Axis]] = {
 }
 """Settings of each axis, in the order of `Randomize`."""
 
-UNFINISHED: frozenset[str] = frozenset({"object_poses", "robot_start"})
+UNFINISHED: frozenset[str] = frozenset({"objects", "object_poses", "robot_start"})
 """Axes that environments refuse."""
 
 
