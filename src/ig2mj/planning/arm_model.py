@@ -130,18 +130,18 @@ class ArmModel:
         """[T, J] joints and [T] number of the point that is gone for; points [P, 3], quats [P, 4]."""
 
         def step(carry: tuple[Array, Array], _: None) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-            q, k = carry
+            q, k = carry  # [1, J], number of a point
             at = jnp.minimum(k, POINTS - 1)
             pos, quat = self._hand(q)
-            move, turn = points[at] - pos, rotation_vector(multiply(quats[at], conjugate(quat)))
+            move, turn = points[at] - pos, rotation_vector(multiply(quats[at][None], conjugate(quat)))
             far, angle = jnp.linalg.norm(move), jnp.linalg.norm(turn)
             there = (far < NEAR) & ((angle < TURNED_NEAR) | (at < POINTS - 1))
             move = PULL * move * jnp.minimum(1.0, FASTEST / jnp.maximum(PULL * far, 1e-6))
             turn = PULL * turn * jnp.minimum(1.0, TURN_FASTEST / jnp.maximum(PULL * angle, 1e-6))
             new = self._step(q, move, turn)
-            return (jnp.where(k < POINTS, new, q), jnp.where(there, k + 1, k)), (q, k)
+            return (jnp.where(k < POINTS, new, q), jnp.where(there, k + 1, k)), (q[0], k)
 
-        (_, _), found = jax.lax.scan(step, (q, jnp.int32(0)), None, length=STEPS)
+        (_, _), found = jax.lax.scan(step, (q[None], jnp.int32(0)), None, length=STEPS)
         return found
 
     def follow(
