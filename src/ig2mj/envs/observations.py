@@ -30,7 +30,7 @@ from ig2mj.scene.scene import Scene
 from ig2mj.sensors.base import Memory, SensorOptions, Space
 from ig2mj.sensors.cameras import check_cameras, split_name
 from ig2mj.sensors.noise import noisy
-from ig2mj.sensors.registry import SENSORS
+from ig2mj.sensors.registry import OWN, SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.states.world import WorldState
 from ig2mj.tasks.objective import Measures, Objective
@@ -63,7 +63,8 @@ def check_names(
         _, sensor = split_name(name)
         if name not in known and (sensor == name or sensor not in SENSORS):
             prefix = name.removesuffix(sensor)
-            raise UnknownNameError("observation", name, known if not prefix else [f"{prefix}{one}" for one in SENSORS])
+            of_camera = [f"{prefix}{image}" for image, one in OWN.items() if one.images]
+            raise UnknownNameError("observation", name, of_camera if prefix else known)
     found = [name for name in names if name not in objective.vectors]
     check_cameras(found, settings.cameras, scene, controller)
     return found

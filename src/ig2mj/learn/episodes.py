@@ -70,6 +70,8 @@ def parse_axes(text: str) -> tuple[str, ...]:
       UnknownNameError: no such axis, with near matches. EngineError: one cannot be played yet.
     """
     names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
+        raise EngineError(f"no axis is named (there is {', '.join(EVERY)})")
     for name in names:
         if name not in EVERY:
             raise UnknownNameError("axis", name, EVERY)

@@ -71,7 +71,7 @@ class TaskPlanner:
           PlanningError: the robot has no hands.
         """
         if domain.hands < 1:
-            raise PlanningError("a robot without hands cannot change a household (take one with hands)")
+            raise PlanningError("a robot without hands cannot change a household (--robot humanoid or fetch has hands)")
         self.domain, self.goal = domain, goal
         self._impossible: dict[Condition, str] = {}
 

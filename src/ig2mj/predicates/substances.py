@@ -16,7 +16,7 @@ from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
 from ig2mj.errors import UnknownNameError
-from ig2mj.knowledge.substances import DUST, STAIN, WATER
+from ig2mj.knowledge.substances import DUST, STAIN, WATER, substances
 from ig2mj.predicates.base import Arguments, Context, Predicate
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
@@ -37,8 +37,8 @@ def substance_index(model: StateModel, name: str) -> int:
     """Place of a substance on the A axis. Raises UnknownNameError: the scene does not use it."""
     names = substance_names(model)
     if name not in names:
-        hint = f"of this scene, which is loaded with substances=['{name}'] to have it,"
-        raise UnknownNameError(f"substance {hint}", name, names)
+        also = f"load the scene with substances=['{name}'], or --substances {name}" if name in substances() else ""
+        raise UnknownNameError("substance in use", name, names, also=also)
     return names.index(name)
 
 

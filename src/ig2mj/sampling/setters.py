@@ -88,6 +88,8 @@ def set_by_name(
       UnknownNameError: no such state, predicate or object. AbilityError: the object lacks the ability.
       StateError: it cannot be set, or not to this value.
     """
+    if name == "present":
+        raise StateError("predicate 'present' cannot be set (fill a container with the substance, or cover an object)")
     index = object_index(model, object_name)
     objects = (index, *model.parameters.halves_of(index))
     mask = np.isin(np.arange(model.tables.num_objects), objects)[None]
@@ -222,7 +224,8 @@ def _sliced(t: _Task, value: bool) -> Change:
 def _extra(name: str) -> Callable[[_Task, bool], Change]:
     def setter(t: _Task, value: bool) -> Change:
         if name not in t.model.extras:
-            raise StateError(f"the scene has no state '{name}': load it with objects=['with:{name}']")
+            fix = f"load it with objects=['with:{name}'], or --object with:{name}"
+            raise StateError(f"the scene has no state '{name}': {fix}")
         write = registry.STATES[name].set
         assert write is not None
         return Change(dataclasses.replace(t.states, **write(t.states, t.mask, value)))

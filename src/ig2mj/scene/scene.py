@@ -11,7 +11,7 @@ import os
 import pathlib
 import warnings
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
 import msgspec
@@ -318,7 +318,11 @@ def scene_with(scene: Scene | str | os.PathLike, objects: Objects = ()) -> Scene
 def _listed(objects: Objects) -> list[str | os.PathLike]:
     if isinstance(objects, Mapping):
         raise Ig2mjError(f"objects = {objects!r}: a list of names, one for each object to add")
-    return [objects] if isinstance(objects, str | os.PathLike) else list(objects)
+    if isinstance(objects, str | os.PathLike):
+        return [objects]
+    if not isinstance(objects, Iterable):
+        raise Ig2mjError(f"{objects!r} is no list of names")
+    return list(objects)
 
 
 def _requests(objects: Objects) -> tuple[list[Change], list[ObjectRequest]]:

@@ -18,7 +18,7 @@ from ig2mj.agents.base import Controller
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process.deprecation import warn_renamed
-from ig2mj.scene.scene import PLAIN, Scene, check_looks
+from ig2mj.scene.scene import LOOKS, PLAIN, Scene, check_looks
 from ig2mj.sensors.cameras import HEAD, CameraView, camera_view
 from ig2mj.sensors.images import Images, Pose, RayPattern
 from ig2mj.states.model import StateModel
@@ -94,7 +94,7 @@ class SensorOptions:
                 raise UnknownNameError("setting of sensors", name, default)
             kinds = _KINDS.get(name, (int, float))
             if not isinstance(value, kinds) or (isinstance(value, bool) and kinds is not bool):
-                raise EngineError(f"{name} = {value!r}: no value of this setting of sensors")
+                raise EngineError(f"sensors: {name} = {value!r}: {_TAKES.get(name, 'a number')} is needed")
         check_looks(values.get("looks", CAMERA_LOOKS))
         rows = values.get("rows")
         return cls(**{**values, "rows": rows if rows is None else tuple(rows)})
@@ -123,6 +123,14 @@ class SensorOptions:
 
 _KINDS: dict[str, Any] = {"rows": (list, tuple, type(None)), "shadows": bool, "looks": str, "cameras": Mapping}
 """Of the values of settings that are no numbers."""
+
+_TAKES = {
+    "rows": "the first row and the first below the last",
+    "shadows": "True or False",
+    "looks": f"a look ({', '.join(LOOKS)})",
+    "cameras": "a mapping of cameras to sizes of images",
+}
+"""What these settings take, for messages."""
 
 
 def _size(camera: str, given: Any) -> tuple[int, int]:

@@ -102,7 +102,8 @@ class _Socket:
                 ping_interval=None,  # a server may be busy for long
             )
         except (*self._errors, TimeoutError) as e:
-            raise PolicyServerError(f"no policy server answers at {self._at}: {e or type(e).__name__}") from e
+            fix = "start one, such as `ig2mj policies serve NAME --port PORT`"
+            raise PolicyServerError(f"no policy server answers at {self._at}: {e or type(e).__name__} ({fix})") from e
 
     def send(self, packed: bytes) -> None:
         """Sends a message. Raises PolicyServerError."""

@@ -414,7 +414,7 @@ class Simulation(Recorded):
           UnknownNameError, ArityError: no such predicate, object or room, or too many or few. AbilityError: the object
           lacks the ability. StateError: it can never be made so, because the object is fixed, for instance.
         """
-        condition = Condition(find(name).name, arguments, value)
+        condition = Condition(find(name).name, _names(name, arguments), value)
         now = self.engine.export(self.physics, 0)
         row = self._sampler.sample(condition, now, self.states, seed, Budget())
         self.last_sampling = dict(self._sampler.rejected)
@@ -433,7 +433,7 @@ class Simulation(Recorded):
           UnknownNameError: no such predicate, object or room. ArityError: too many or too few arguments.
           AbilityError: with `strict`, the object lacks the ability; otherwise that is False.
         """
-        return self.holds(Atom(name, arguments), strict=strict)
+        return self.holds(Atom(name, _names(name, arguments)), strict=strict)
 
     def holds(self, expression: Expression | str, strict: bool = False) -> bool:
         """Whether an expression holds now; text as `ig2mj.predicates.parse` reads it. Raises ExpressionError, and as
@@ -504,3 +504,11 @@ class Simulation(Recorded):
                 yield
             finally:
                 self._window = None
+
+
+def _names(predicate: str, arguments: tuple[str, ...]) -> tuple[str, ...]:
+    """Arguments of a predicate. Raises StateError: one is no name."""
+    for given in arguments:
+        if not isinstance(given, str):
+            raise StateError(f"predicate '{predicate}': {given!r} is no name (its truth is value=True or value=False)")
+    return arguments

@@ -285,7 +285,8 @@ def _number(field: dataclasses.Field[Any], given: Any) -> float | int:
     except (TypeError, ValueError):
         value = math.nan
     if isinstance(given, bool) or not 0 <= value < math.inf or (whole and (value < 1 or value != int(value))):
-        raise EngineError(f"randomize: {name} = {given!r}: a number such as {field.default}")
+        kind = "a whole number from 1" if whole else "a finite number of at least 0"
+        raise EngineError(f"randomize: {name} = {given!r}: {kind}, such as {field.default}")
     if name in _PROBABILITIES and value > 1:
         raise EngineError(f"randomize: {name} = {given!r}: a probability is between 0 and 1")
     return int(value) if whole else value

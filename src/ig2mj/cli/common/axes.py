@@ -7,13 +7,18 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ig2mj.errors import InputError
 from ig2mj.learn.axes import ActOf, AxisResult, evaluate_axes, result_of
 from ig2mj.learn.episodes import ALL, COUNT, Episodes, find_episodes, parse_axes
 
 
 def chosen_episodes(task: str, given: pathlib.Path | None) -> Episodes:
     """The episodes of a file, or those that ship for a task. Raises InputError, UnknownNameError."""
-    return Episodes.load(find_episodes(task if given is None else given))
+    episodes = Episodes.load(find_episodes(task if given is None else given))
+    if episodes.header["task"] != task:
+        fix = f"`ig2mj episodes make {task} --out FILE` writes those of {task}"
+        raise InputError(given or task, f"has episodes of {episodes.header['task']}, not of {task}", fix=fix)
+    return episodes
 
 
 def check_episodes(axes: str, count: int | None, episodes: Episodes) -> tuple[tuple[str, ...], int]:

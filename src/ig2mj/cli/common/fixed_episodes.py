@@ -100,10 +100,12 @@ def evaluate_server(
     from ig2mj.serving.remote_actor import RemoteActor
 
     request.check()
-    if not 0 < timeout < float("inf") or chunk < 0 or size < 1:
-        raise Ig2mjError(
-            f"--timeout {timeout:g}, --chunk {chunk}, --image-size {size}: numbers above 0 (--chunk: or 0)"
-        )
+    if not 0 < timeout < float("inf"):
+        raise Ig2mjError(f"--timeout {timeout:g}: a number of seconds above 0")
+    if chunk < 0:
+        raise Ig2mjError(f"--chunk {chunk}: at least one step, or 0 for all that the server sends")
+    if size < 1:
+        raise Ig2mjError(f"--image-size {size}: at least one pixel")
     known = find_task(task)
     episodes = chosen_episodes(known.name, request.file)
     axes, count = check_episodes(request.axes or NOMINAL, request.episodes, episodes)
@@ -131,7 +133,12 @@ def _options_of(
     """Of `ig2mj.make`, from what a server says of itself and what is asked for."""
     ours = says.get("server") == "ig2mj"
     if ours and says.get("task") != task.name:
-        raise EngineError(f"the server's policy is for {says.get('task')!s}, not for {task.name}")
+        raise EngineError(f"the server's policy is for {says.get('task')!s}, not for {task.name} (name that task)")
+    made_for = str(says.get("robot")) if ours and "robot" in says else None
+    if made_for and request.robot and request.robot != made_for:
+        raise EngineError(
+            f"the server's policy is for robot '{made_for}', not for '{request.robot}' (leave out --robot)"
+        )
     robot = request.robot or (says.get("robot") if ours else None) or next(iter(task.robots))
     grasping = request.grasping or (says.get("grasping") if ours else None) or task.grasping
     options: dict[str, Any] = {"robot": robot, "grasping": grasping}

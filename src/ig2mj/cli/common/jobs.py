@@ -84,11 +84,18 @@ def follow(title: str) -> Iterator[ProgressCallback]:
 
 
 def tell_failures(failed: Mapping[str, str], total: int, again: str = "--resume") -> None:
-    """Lists failed jobs with their reasons on standard error. `again`: what tries them again."""
+    """Lists failed jobs on standard error, by reason; one line where all fail alike. `again`: what tries them again."""
     if not failed:
         return
+    named: dict[str, list[str]] = {}
+    for name, reason in failed.items():
+        named.setdefault(reason, []).append(name)
+    if len(named) == 1 and len(failed) == total > 1:
+        print(f"error: all {total} jobs failed: {next(iter(named))}", file=sys.stderr)
+        return
     print(f"{len(failed)} of {total} jobs failed; {again} tries them again:", file=sys.stderr)
-    for name, reason in list(failed.items())[:LISTED]:
-        print(f"  {name}: {reason}", file=sys.stderr)
-    if len(failed) > LISTED:
-        print(f"  and {len(failed) - LISTED} more", file=sys.stderr)
+    for reason, names in list(named.items())[:LISTED]:
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        print(f"  {names[0]}{more}: {reason}", file=sys.stderr)
+    if len(named) > LISTED:
+        print(f"  and {len(named) - LISTED} more reasons", file=sys.stderr)

@@ -126,7 +126,7 @@ class SubstanceModel:
 def of(model: StateModel) -> SubstanceModel:
     """The substances of a scene. Raises StateError: it has none."""
     if model.substances is None:
-        raise StateError("the scene has no substances in use: load it with substances=['water', ...]")
+        raise StateError("the scene has no substances in use: load it with substances=['water'], or --substances water")
     return model.substances
 
 
