@@ -12,9 +12,11 @@ CONSTRUCTOR = ("engine/view.py", "over")
 
 
 def _edits(source: str, setter: str = "") -> list[str]:
-    """Uses of `__dict__`, writes through `vars`, and calls of `object.__setattr__` outside of the function `setter`."""
+    """Uses of `__dict__`, writes through `vars`, and calls of `object.__setattr__` outside of `setter` and
+    `__post_init__`, in which a dataclass brings its own fields into form."""
     tree = ast.parse(source)
-    allowed = [n for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) and f.name == setter for n in ast.walk(f)]
+    functions = [f for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) and f.name in (setter, "__post_init__")]
+    allowed = [n for f in functions for n in ast.walk(f)]
     found = []
     for node in ast.walk(tree):
         match node:

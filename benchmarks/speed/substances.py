@@ -27,6 +27,7 @@ import tyro
 
 import ig2mj
 from benchmarks.harness.pouring import write_pouring
+from benchmarks.harness.results import keep_row, machine, provenance
 from ig2mj.engine import make_engine
 from ig2mj.knowledge.transitions import load_transitions
 from ig2mj.scene.scene import Scene
@@ -101,7 +102,7 @@ def native(seconds: float = 3.0) -> None:
 
         going = states
         row = {"case": name, "microseconds": round(_best(act, seconds), 2)}
-        print(json.dumps(row), flush=True)
+        keep_row({**row, **provenance(), **machine(-1)}, None)
 
 
 def _rules_file(folder: pathlib.Path) -> pathlib.Path:
@@ -145,7 +146,7 @@ def batch(worlds: int = 4096, engine: str = "warp") -> None:
                 "steps_per_s": round(worlds * STEPS / min(times)),
                 "percent": round(100 * (min(times) / plain - 1), 2),
             }
-            print(json.dumps(row), flush=True)
+            keep_row({**row, **provenance(), **machine(-1)}, None)
 
 
 def _nothing(batch, carry):
@@ -175,7 +176,7 @@ def pour(worlds: int = 10000, engine: str = "warp") -> None:
         "litres_from_native": float(apart),
     }
     row["passes"] = row["largest_relative_change"] < 1e-5 and row["litres_from_native"] < 1e-3
-    print(json.dumps(row))
+    keep_row({**row, **provenance(), **machine(-1)}, None)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import pytest
 import ig2mj
 from ig2mj.agents import Humanoid
 from ig2mj.planning import execution
-from ig2mj.planning.bodies import body_of
+from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles, hand_way
 from ig2mj.planning.driving import stretch
 from ig2mj.planning.phases import Phase, Programs

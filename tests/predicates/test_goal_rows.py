@@ -51,8 +51,11 @@ def _view(rng):
 def test_every_predicate_of_objects_but_sight_is_one_of_its_arguments():
     every = PREDICATES.values()
     assert {p.name for p in every if p.per_object is None and not p.of_arguments} == {"in_fov_of_agent"}
-    of_substances = {p.name for p in OF_SUBSTANCES.values() if "substance" in p.arguments}  # they read states only
-    assert {p.name for p in every if p.of_arguments} == set(LITERALS) | of_substances
+    of_states = {
+        "attached",
+        *(p.name for p in OF_SUBSTANCES.values() if "substance" in p.arguments),
+    }  # read states only
+    assert {p.name for p in every if p.of_arguments} == set(LITERALS) | of_states
 
 
 @pytest.mark.slow

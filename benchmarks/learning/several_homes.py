@@ -1,10 +1,10 @@
 """Activities in all homes: where they fit, what their experts reach there, and what training in several homes costs.
 
-    python3 benchmarks/several_homes.py fit                   which homes each activity fits into, and why not
-    python3 benchmarks/several_homes.py pools --jobs 64       start states of the homes of both splits
-    python3 benchmarks/several_homes.py experts --jobs 16     success of the experts in each home
-    python3 benchmarks/several_homes.py throughput            agent steps/s of eight homes, together and alone
-    python3 benchmarks/several_homes.py axes                  agent steps/s with each axis of randomization
+    python -m benchmarks.learning.several_homes fit                   which homes each activity fits into, and why not
+    python -m benchmarks.learning.several_homes pools --jobs 64       start states of the homes of both splits
+    python -m benchmarks.learning.several_homes experts --jobs 16     success of the experts in each home
+    python -m benchmarks.learning.several_homes throughput            agent steps/s of eight homes, together and alone
+    python -m benchmarks.learning.several_homes axes                  agent steps/s with each axis of randomization
 
 Every row is printed as JSON when it is known, and appended to `--out`; rows that are there are not measured again.
 """
@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 import ig2mj
+from benchmarks.harness.results import keep_row, machine, provenance
 from ig2mj.envs.experts import expert_of
 from ig2mj.errors import Ig2mjError
 from ig2mj.scene.paths import shipped_homes
@@ -194,10 +195,7 @@ def main() -> None:
     with concurrent.futures.ProcessPoolExecutor(args.jobs or os.cpu_count(), context) as workers:
         rows = workers.map(done, jobs) if args.jobs != 1 else map(done, jobs)
         for row in rows:
-            print(json.dumps(row), flush=True)
-            if args.out is not None:
-                with args.out.open("a") as file:
-                    file.write(json.dumps(row) + "\n")
+            keep_row({**row, **provenance(), **machine(-1)}, args.out)
 
 
 if __name__ == "__main__":
