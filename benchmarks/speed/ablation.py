@@ -137,7 +137,7 @@ def _environment(row: Row, num_worlds: int) -> tuple[Any, Any, int, Any]:
     args = argparse.Namespace(
         robot="humanoid", engine=None, grasping="mitten", observations=[], pool_size=None, profile=None, hold=5
     )
-    env, call, carry = environments.prepared(row.home, num_worlds, args)
+    env, call, carry = environments.prepared(row.home, num_worlds, "plain", args)
 
     def report(carry: Any) -> dict[str, Any]:
         return {"metrics": env.metrics(carry[0]), **environments.memory(num_worlds), **environments.device()}
