@@ -52,6 +52,7 @@ from ig2mj.errors import Ig2mjError
 from ig2mj.install_hint import pip_install_module
 from ig2mj.plugins import Registry
 from ig2mj.plugins.named_files import name_file
+from ig2mj.process.settings import default_variables
 from ig2mj.process.spawning import allow_spawning
 from ig2mj.process.variables import error_of_variable
 
@@ -106,6 +107,8 @@ _USAGE = "usage: ig2mj [--debug] [--plugin FILE.py] [--version] COMMAND ..."
 def main(argv: Sequence[str] | None = None) -> None:
     """Console script: runs the sub-command named in `argv` (default: the process's arguments) and exits."""
     allow_spawning()
+    # XLA's C++ warnings, such as of its emitter of LLVM code, say nothing to a user. Read when JAX is imported.
+    default_variables({"TF_CPP_MIN_LOG_LEVEL": "2"})
     status = call(sys.argv[1:] if argv is None else argv)
     if status == INTERRUPTED:
         # Files are closed by now. Libraries are not unloaded: XLA crashes if it was compiling.

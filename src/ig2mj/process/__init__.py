@@ -3,6 +3,9 @@
 Importing ig2mj changes nothing. The functions below are called where the first engine, simulation or picture is made,
 or earlier by whoever wants to; a second call does nothing. What the user has decided stands.
 
+`ig2mj.cli.main` (the command, not the library):
+  - The variable TF_CPP_MIN_LOG_LEVEL is 2, unless it is set: XLA's warnings are not printed, its errors are.
+
 `prepare_jax` (every engine):
   - JAX's option `jax_compilation_cache_dir`: compiled programs are kept in ig2mj's cache folder, unless it has a value;
     then also `jax_persistent_cache_min_compile_time_secs`, 0: all programs are kept.
