@@ -38,6 +38,9 @@ PRESSES = 4
 RAISED = 0.25
 """m that a tool is lifted before the hand goes back to where it carries it."""
 
+STRAYED = 0.15
+"""m from where a hand carries the tool beyond which it goes back before the robot drives."""
+
 TURNS = (np.pi / 2, -np.pi / 2, np.pi)
 """rad about a face's normal by which a tool is turned where it has no room otherwise."""
 
@@ -96,6 +99,10 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 plan = _plan(world, tool, hand, spots, visited)
             if plan is None:
                 break
+            if _strayed(world, hand):
+                yield _back(world, hand)
+                if tool not in world.held:
+                    continue
             visited.append(plan.stance)
             if failed := (yield from go(world, plan.stance)):
                 reason, detail = failed, f"no way leads to where the dirt of {name} is in reach"
@@ -105,12 +112,14 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 tried.update(spot.number for spot in stroke)
                 if not world.facts.holds(predicate, name) or tool not in world.held:
                     break
-                if program := _program(world, tool, hand, plan, stroke[0]):
+                program = _program(world, tool, hand, plan, stroke[0])
+                if not program and _strayed(world, hand):
+                    yield _back(world, hand)
+                    program = _program(world, tool, hand, plan, stroke[0]) if tool in world.held else []
+                if program:
                     reason, detail = (yield program), f"{tool} did not take enough off {name}"
         if tool in world.held:
-            hand = hand_with(world, tool)
-            up = vector3(world.grip(hand) + RAISED * UP)
-            yield [Phase(hand=hand, pos=up, tolerance=0.04, limit=15, after=""), carry(world, hand)]
+            yield _back(world, hand_with(world, tool))
         if not world.facts.holds(predicate, name):
             return Outcome()
         return Outcome(reason or "not_true_after", detail)
@@ -305,6 +314,17 @@ def _turned(world: PlannedWorld, tool: str, hand: int, region: _Region, normal: 
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     rotation = (np.eye(3) + s * k + (1 - c) * (k @ k)) @ region.rotation
     return _Region.turned(rotation, points)
+
+
+def _strayed(world: PlannedWorld, hand: int) -> bool:
+    """Whether a hand is not where it carries what it holds."""
+    return bool(np.linalg.norm(world.grip(hand) - world.carried(hand, world.stance)) > STRAYED)
+
+
+def _back(world: PlannedWorld, hand: int) -> Program:
+    """Lifts the tool off where it was pressed, to where the hand carries it: ways are planned from there."""
+    up = vector3(world.grip(hand) + RAISED * UP)
+    return [Phase(hand=hand, pos=up, tolerance=0.04, limit=15, after=""), carry(world, hand)]
 
 
 def _press(

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from ig2mj.planning.clearance import straight
 from ig2mj.planning.driving import go
 from ig2mj.planning.moves import (
     ATTEMPTS,
@@ -28,11 +29,14 @@ from ig2mj.scene.tables import LinkKind
 FINGER, NEAR_BUTTON = 0.06, 0.13
 """m from a grasp point to the fingers' frames, and before a button at which a hand comes to it."""
 
+PRESSING = 0.07
+"""m from a button within which a finger holds it down for sure, whatever is in the way of coming nearer."""
+
 LOWER = 0.035
 """m below a button that a hand stays which comes to it under what stands out above it, such as a lamp's shade."""
 
-STANCES = 12
-"""That are tried."""
+STANCES, ALL_AROUND = 12, 60
+"""That are tried, and that are looked at for those on the button's side of the object."""
 
 
 def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
@@ -64,10 +68,10 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             if way is None:
                 reason, detail = "no_path", f"the hand has no way to the button of {name}"
                 continue
-            at = vector3(button - fingers * FINGER - lower * UP)
+            at = _pressing(button, fingers, lower)
             reason = yield [
                 *travel(hand, way, quat),
-                Phase(hand=hand, pos=at, quat=quat, until=Until.WAITED, limit=5, speed=0.03),
+                Phase(hand=hand, pos=vector3(at), quat=quat, until=Until.WAITED, limit=5, speed=0.03),
                 *travel(hand, way[::-1], None),
                 *rest(hand),
             ]
@@ -79,11 +83,16 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
     return toggle
 
 
+def _pressing(button: Vector, fingers: Vector, lower: float) -> Vector:
+    """Grasp point of a hand whose fingers are at a button, or so many m below it."""
+    return button - fingers * FINGER - lower * UP
+
+
 def _plan(
     world: PlannedWorld, point: Vector, hand: int, attempt: int, at: Stance | None
 ) -> tuple[Stance, Vector, float] | None:
     """A stance, and a point near a button that a hand has a way to; from there the fingers go to so many m below the
-    button.
+    button. Those come first from which nothing is in the fingers' way up to the button: it is on a side of the object.
 
     Args:
       at: where the robot stays, since a hand holds what is switched; None: it may go anywhere.
@@ -91,12 +100,29 @@ def _plan(
     obstacles, floor = world.obstacles(), world.floor()
     passed = 0
 
+    def aims(stance: Stance) -> list[tuple[Stance, Vector, float]]:
+        fingers = towards(stance.xy, point)
+        near = point - fingers * (NEAR_BUTTON + FINGER)
+        over = point + NEAR_BUTTON * UP - fingers * FINGER
+        return [(stance, near, 0.0), (stance, over, 0.0), (stance, near - LOWER * UP, LOWER)]
+
     def candidates() -> Iterator[tuple[Stance, Vector, float]]:
-        for stance in world.stances(hand, point, floor, AWAY, most=STANCES) if at is None else [at]:
-            fingers = towards(stance.xy, point)
-            yield stance, point - fingers * (NEAR_BUTTON + FINGER), 0.0
-            yield stance, point + NEAR_BUTTON * UP - fingers * FINGER, 0.0
-            yield stance, point - fingers * (NEAR_BUTTON + FINGER) - LOWER * UP, LOWER
+        blocked, free = list[tuple[Stance, Vector, float]](), 0
+        for stance in world.stances(hand, point, floor, AWAY, most=ALL_AROUND) if at is None else [at]:
+            for candidate in aims(stance):
+                if not is_blocked(candidate):
+                    free += 1
+                    yield candidate
+                elif len(blocked) < 3 * STANCES:
+                    blocked.append(candidate)
+            if free >= 3 * STANCES:
+                return
+        yield from blocked
+
+    def is_blocked(candidate: tuple[Stance, Vector, float]) -> bool:
+        stance, aim, lower = candidate
+        fingers = towards(stance.xy, point)
+        return not straight(obstacles, world.spheres(fingers), aim, _pressing(point, fingers, lower), PRESSING - lower)
 
     def has_way(candidate: tuple[Stance, Vector, float], search: bool) -> bool:
         nonlocal passed
