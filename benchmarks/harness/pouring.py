@@ -36,14 +36,17 @@ def _inside(x: float, y: float, z: float) -> mf.InsideEntry:
     return mf.InsideEntry(litres=8000.0 * x * y * z, vertices=corners, rim=corners[4:])
 
 
-def write_pouring(folder: pathlib.Path, litres: float = 1.0, degrees: float = 110.0) -> pathlib.Path:
-    """Writes it; the folder. `litres` of water in the jug, which is tilted by `degrees` about y."""
+def write_pouring(
+    folder: pathlib.Path, litres: float = 1.0, degrees: float = 110.0, glass: tuple[float, float, float] = GLASS
+) -> pathlib.Path:
+    """Writes it; the folder. `litres` of water in the jug, which is tilted by `degrees` about y. `glass`: half sizes of
+    the glass's inside, m."""
     folder.mkdir(parents=True, exist_ok=True)
     half = np.deg2rad(degrees) / 2
     places = [
         ("floor", [((0, 0, -0.05), (3, 3, 0.05))], (0, 0, 0), (1, 0, 0, 0), False),
         ("jug", _tub(*JUG), (0, 0, 0.5), (float(np.cos(half)), 0, float(np.sin(half)), 0), False),
-        ("glass", _tub(*GLASS), (0.15, 0, GLASS[2] + 2 * WALL), (1, 0, 0, 0), True),
+        ("glass", _tub(*glass), (0.15, 0, glass[2] + 2 * WALL), (1, 0, 0, 0), True),
     ]
     bodies = []
     for name, boxes, pos, quat, free in places:
@@ -65,7 +68,7 @@ def write_pouring(folder: pathlib.Path, litres: float = 1.0, degrees: float = 11
     objects = [
         entry("floor", "floors", True),
         entry("jug", "carafe", True, inside=_inside(*JUG), state={"volume": {"water": litres}}),
-        entry("glass", "glass", False, inside=_inside(*GLASS)),
+        entry("glass", "glass", False, inside=_inside(*glass)),
     ]
     made = mf.Manifest(format_version=mf.FORMAT_VERSION, name="pouring", objects=objects, substances=["water"])
     mf.save_manifest(made, folder / "manifest.json")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import jax
 import numpy as np
 import pytest
-from pouring_scene import write_pouring_scene
+from substance_world import GLASS
 
 import ig2mj
+from benchmarks.harness.pouring import write_pouring
 from ig2mj.errors import StateError, UnknownNameError
 from ig2mj.sampling.many import sample
 from ig2mj.simulation import Simulation
@@ -19,7 +20,7 @@ from ig2mj.worlds.pool import load_pool_scene
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    return ig2mj.load_scene(write_pouring_scene(tmp_path_factory.mktemp("pouring")))
+    return ig2mj.load_scene(write_pouring(tmp_path_factory.mktemp("pouring"), 0.6, glass=GLASS))
 
 
 @pytest.fixture(scope="module")

@@ -225,8 +225,8 @@ class Randomize:
 
     @classmethod
     def every(cls) -> Randomize:
-        """All axes with their usual settings."""
-        usual: dict[str, Any] = {name: kind() for name, kind in AXES.items()}
+        """All axes that environments take, with their usual settings."""
+        usual: dict[str, Any] = {name: kind() for name, kind in AXES.items() if name not in UNFINISHED}
         return cls(**usual)
 
     def settings(self, axis: str) -> Any:
