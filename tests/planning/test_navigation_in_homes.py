@@ -8,9 +8,11 @@ from ig2mj.agents import Humanoid
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.planning import execution
 from ig2mj.planning.driving import drive
-from ig2mj.planning.motion_planner import NEAR_START, MotionPlanner
+from ig2mj.planning.free_floor import NEAR_START
+from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.stage import CoreStage
+from ig2mj.planning.stances import stances
 from ig2mj.planning.starts import open_doors, start_place
 from ig2mj.planning.steps import make_step
 from ig2mj.sampling.query import SceneQuery
@@ -56,7 +58,7 @@ class Course:
         name = tables.object_names[self.rng.choice(np.flatnonzero(~np.isin(kinds, NOT_VISITED) & ~parked))]
         floor, hand = world.floor(), len(world.body.hands) - 1
         points = (world.com(name), *world.rim(name))
-        reachable = any(next(world.stances(hand, point, floor, 0.55), None) is not None for point in points)
+        reachable = any(next(stances(world, hand, point, floor, 0.55), None) is not None for point in points)
         self.rung.begin(0, make_step("navigate_to", (name,)))
         outcome = self.rung.advance()[0]
         return outcome.done if reachable else None

@@ -12,6 +12,7 @@ from jaxtyping import Float
 Quat = Float[np.ndarray, "*#b 4"]
 Vec = Float[np.ndarray, "*#b 3"]
 
+_UP = np.array([0.0, 0.0, 1.0])
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0], np.float32)
 
 
@@ -88,3 +89,26 @@ def matrix_to_quat(m: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "4"]:
     chosen = columns[int(np.argmax(np.diagonal(columns)))]
     chosen = chosen / np.linalg.norm(chosen)
     return -chosen if chosen[0] < 0 else chosen
+
+
+def yaw_quat(angle: float) -> Float[np.ndarray, "4"]:
+    """Rotation about the vertical by an angle in rad, w-x-y-z."""
+    return np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
+
+
+def about_vertical(angle: float) -> Float[np.ndarray, "3 3"]:
+    """Rotation matrix about the vertical by an angle in rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def turn_onto(one: Float[np.ndarray, "3"], other: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Matrix of the least rotation from one direction to another."""
+    a, b = one / np.linalg.norm(one), other / np.linalg.norm(other)
+    axis, cos = np.cross(a, b), float(a @ b)
+    if cos < -0.999:
+        side = np.cross(a, _UP) if abs(a @ _UP) < 0.9 else np.array([1.0, 0.0, 0.0])
+        side = side / np.linalg.norm(side)
+        return 2 * np.outer(side, side) - np.eye(3)
+    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + k + k @ k / (1 + cos)

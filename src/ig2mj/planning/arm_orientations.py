@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from jaxtyping import Float
 
 from ig2mj.geometry.host_rotations import quat_multiply
-
-if TYPE_CHECKING:
-    from ig2mj.planning.world import PlannedWorld
+from ig2mj.planning.world import PlannedWorld
 
 ARM_TURNS = (0.0, *(sign * k * np.pi / 4 for k in (1, 2, 3) for sign in (1, -1)), np.pi)
 """The same of a hand on an arm, which points about to where the robot looks."""

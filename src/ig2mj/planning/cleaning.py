@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.bodies import Follower
 from ig2mj.planning.clearance import Obstacles
@@ -22,9 +23,10 @@ from ig2mj.planning.handing_over import hand_over
 from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_path, hand_with, travel, vector3
 from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase
+from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
-from ig2mj.planning.world import DirtSpot, PlannedWorld, Rotation, Stance, Vector, about_vertical, turn_onto
+from ig2mj.planning.world import DirtSpot, PlannedWorld, Rotation, Stance, Vector
 
 ROUNDS, STROKES = 24, 8
 """Stances from which an object is cleaned, and places of the tool for each, at most."""
@@ -208,7 +210,7 @@ def _plan(
     away = world.away(world.spheres(*world.hand_axes(hand), holding=tool, hand=hand))
     best: _CleanPlan | None = None
     for aim in spots[:NEAREST]:
-        for stance in world.stances(hand, aim.pos + PRESSED * aim.normal, floor, away, STANCES):
+        for stance in stances(world, hand, aim.pos + PRESSED * aim.normal, floor, away, STANCES):
             if any(np.linalg.norm(np.subtract(stance.xy, v.xy)) < ELSEWHERE for v in visited):
                 continue
             for turn, region in enumerate(_regions(world, tool, hand, stance, aim.normal)):

@@ -10,10 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.planning.bodies import HandedBody, HoveringBody
-from ig2mj.planning.motion_planner import NEAR_START, FreeFloor, Point
+from ig2mj.planning.free_floor import NEAR_START, FreeFloor, Point
 from ig2mj.planning.moves import Primitive, Program, free_hand
 from ig2mj.planning.occupancy import door_objects
 from ig2mj.planning.opening import joints_of, move_joint
+from ig2mj.planning.stances import behind_wall
 from ig2mj.planning.steps import Step
 from ig2mj.planning.world import PlannedWorld
 
@@ -107,7 +108,7 @@ def _nearest(world: PlannedWorld, floor: FreeFloor, point: Float[np.ndarray, "3"
     for k in np.argsort(away)[:: max(1, len(away) // LOOKED_AT)]:
         if not np.isfinite(away[k]):
             return None
-        if not world.behind_wall(obstacles, middles[k], point):
+        if not behind_wall(world, obstacles, middles[k], point):
             return middles[k]
     return None
 

@@ -11,10 +11,11 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ig2mj.planning.motion_planner import NEAR_START, FreeFloor
+from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.moves import UP, Program, rest, vector3
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.phases import Base, Phase
+from ig2mj.planning.stances import clear_with_held
 from ig2mj.planning.world import PlannedWorld, Stance
 
 BACK = np.arange(0.0, 1.25, 0.1)
@@ -61,7 +62,7 @@ def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
         return "no_path" if way is None else (yield [*before, *drive(way, stance.yaw), *last])
     if tucked := tuck(world):
         yield tucked
-    if apart < 0.3 and turned < 0.3 and world.clear_with_held(_between(Stance((here[0], here[1]), yaw), stance)):
+    if apart < 0.3 and turned < 0.3 and clear_with_held(world, _between(Stance((here[0], here[1]), yaw), stance)):
         return (yield [shift(stance), *last])
     turning = world.floor(holding=True)
     start = _backed(world, Stance((float(here[0]), float(here[1])), yaw), standing, turning)
@@ -122,7 +123,7 @@ def _backed(world: PlannedWorld, stance: Stance, standing: FreeFloor, turning: F
             return None
         if turning.nearest(there.xy, RESOLUTION) is None:
             continue
-        return there if apart == 0 or world.clear_with_held(_between(there, stance)) else None
+        return there if apart == 0 or clear_with_held(world, _between(there, stance)) else None
     return None
 
 

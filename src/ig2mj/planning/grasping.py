@@ -7,8 +7,8 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 import numpy as np
 
 from ig2mj.planning.driving import go
+from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.grasps import GraspPose, grasp_poses, ordered
-from ig2mj.planning.motion_planner import NEAR_START, FreeFloor
 from ig2mj.planning.moves import (
     ATTEMPTS,
     BELOW,
@@ -27,6 +27,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
 
@@ -134,7 +135,7 @@ def _plan(
 
     def candidates() -> Iterator[tuple[Stance, GraspPose]]:
         for point in (world.com(name), *points[_spread(points, world.com(name))], _nearest(world, floor, points)):
-            for stance in world.stances(hand, point, floor, AWAY):
+            for stance in stances(world, hand, point, floor, AWAY):
                 near = [p for p in ordered(poses, stance.yaw, on_arm) if world.reaches(hand, stance, p.at(p.before))]
                 if prefers is not None:
                     near.sort(key=_less_wanted(prefers))

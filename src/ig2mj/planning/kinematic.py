@@ -23,7 +23,7 @@ from ig2mj.agents.base import Controller
 from ig2mj.engine.snapshot import Snapshot, fitted
 from ig2mj.engine.view import PhysicsView
 from ig2mj.engine.writes import joints
-from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
+from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse, yaw_quat
 from ig2mj.planning.bodies import HoveringBody, Senses
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.domain import Domain
@@ -263,7 +263,7 @@ class KinematicRung:
         self._stage.put(self._base(robot), robot.hands, held)
 
     def _base(self, robot: _Robot) -> Pose:
-        return np.array([*robot.xy, self._height + robot.rise]), _turn(robot.yaw)
+        return np.array([*robot.xy, self._height + robot.rise]), yaw_quat(robot.yaw)
 
     def _follow(self, world: int, program: Program, step: Step) -> str:
         """What a program does; the reason why it failed."""
@@ -345,10 +345,6 @@ def _of(frame: Pose, pose: Pose) -> Pose:
 def _in(frame: Pose, pose: Pose) -> Pose:
     """A pose, seen from a frame with the same parent."""
     return quat_rotate_inverse(frame[1], pose[0] - frame[0]), quat_multiply(quat_conjugate(frame[1]), pose[1])
-
-
-def _turn(yaw: float) -> Float[np.ndarray, "4"]:
-    return np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
 
 
 def kinematic_episodes(

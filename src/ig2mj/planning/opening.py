@@ -27,6 +27,7 @@ from ig2mj.planning.moves import (
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import PlannedWorld, Stance, Vector
 
@@ -199,7 +200,7 @@ def _plan(
         for grip in grips:
             places = joint.path(grip, fraction)
             first, normal = places[0]
-            for stance in world.stances(hand, places[len(places) // 2][0], floor, AWAY, most=STANCES):
+            for stance in stances(world, hand, places[len(places) // 2][0], floor, AWAY, most=STANCES):
                 upright = grips is not joint.edges and float(np.linalg.norm(normal[:2])) > UPRIGHT
                 if upright and (np.array(stance.xy) - first[:2]) @ normal[:2] <= 0.0:
                     continue  # the robot stands behind the face

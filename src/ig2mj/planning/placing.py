@@ -31,8 +31,10 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.opening import Tried, open_into
 from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.spots import Spot, grip_for, spots_for
+from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import PlannedWorld, Spot, Stance, Vector
+from ig2mj.planning.world import PlannedWorld, Stance, Vector
 
 SPARE = 0.03
 """m before its place from which on an object may touch what is around."""
@@ -80,7 +82,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 reason, detail = "slipped", f"the hand lost {name}"
                 continue
             _, yaw = world.base
-            target, quat, rotation = world.grip_for(hand, name, spot)
+            target, quat, rotation = grip_for(world, hand, name, spot)
             fingers, palm = world.hand_axes(hand, rotation)
             target = target + LET_GO * UP
             spheres = world.spheres(fingers, palm, holding=name, hand=hand, rotation=rotation)
@@ -156,8 +158,8 @@ def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int)
         cannot be let down to, at last."""
         nonlocal lacking
         last = []
-        for spot in world.spots(predicate, name, where):
-            target, _, rotation = world.grip_for(hand, name, spot)
+        for spot in spots_for(world, predicate, name, where):
+            target, _, rotation = grip_for(world, hand, name, spot)
             spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
             lacking = _NO_WAY if lacking == _NO_SPOT else lacking
             if not _has_room(obstacles, spheres, target + LET_GO * UP):
@@ -173,8 +175,8 @@ def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int)
         nonlocal lacking
         for spot, target, spheres in spots():
             lacking = _NO_STANCE if lacking == _NO_WAY and not seen else lacking
-            palm = world.hand_axes(hand, world.grip_for(hand, name, spot)[2])[1]
-            for stance in world.stances(hand, target, floor, world.away(spheres), most=STANCES):
+            palm = world.hand_axes(hand, grip_for(world, hand, name, spot)[2])[1]
+            for stance in stances(world, hand, target, floor, world.away(spheres), most=STANCES):
                 lacking = _NO_WAY
                 if points_ahead(world, palm, stance.yaw):
                     seen.append(stance)
@@ -182,7 +184,7 @@ def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int)
 
     def has_way(candidate: tuple[Stance, Spot], search: bool) -> bool:
         stance, spot = candidate
-        target, quat, rotation = world.grip_for(hand, name, spot)
+        target, quat, rotation = grip_for(world, hand, name, spot)
         spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
         start, back = world.carried(hand, stance), [UP, -ahead(stance.yaw)]
         standing = obstacles.about(stance.xy, *world.body.trunk)

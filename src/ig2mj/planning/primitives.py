@@ -18,6 +18,7 @@ from ig2mj.planning.moves import Primitive, PrimitiveFailed
 from ig2mj.planning.opening import set_open
 from ig2mj.planning.placing import bring_out, place
 from ig2mj.planning.pushing import push
+from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
 from ig2mj.planning.treatments import cook, freeze, slice_, soak
@@ -62,7 +63,7 @@ def navigate_to(world: PlannedWorld, step: Step) -> Primitive:
         return Outcome(*(yield from drive_near(world, step.object)))
     reason, hand, floor = "no_base", len(world.body.hands) - 1, world.floor()
     for point in (world.com(step.object), *world.rim(step.object)):
-        for stance in world.stances(hand, point, floor, AWAY):
+        for stance in stances(world, hand, point, floor, AWAY):
             reason = yield from go(world, stance)
             if not reason:
                 return Outcome()

@@ -24,6 +24,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.placing import place
+from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
 
@@ -111,7 +112,7 @@ def _plan(world: PlannedWorld, name: str, other: str, hand: int, passed: int) ->
                 continue
             point = start + hit * way
             end = point + min(gap, STROKE) * way
-            for stance in world.stances(hand, point, floor, AWAY, STANCES):
+            for stance in stances(world, hand, point, floor, AWAY, STANCES):
                 if world.reaches(hand, stance, end):
                     yield stance, point, way
 

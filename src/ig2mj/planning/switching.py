@@ -22,6 +22,7 @@ from ig2mj.planning.moves import (
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
 from ig2mj.scene.tables import LinkKind
@@ -108,7 +109,7 @@ def _plan(
 
     def candidates() -> Iterator[tuple[Stance, Vector, float]]:
         blocked, free = list[tuple[Stance, Vector, float]](), 0
-        for stance in world.stances(hand, point, floor, AWAY, most=ALL_AROUND) if at is None else [at]:
+        for stance in stances(world, hand, point, floor, AWAY, most=ALL_AROUND) if at is None else [at]:
             for candidate in aims(stance):
                 if not is_blocked(candidate):
                     free += 1

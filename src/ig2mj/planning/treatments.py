@@ -6,6 +6,7 @@ from collections.abc import Generator, Iterator, Sequence
 
 import numpy as np
 
+from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.planning.driving import go
 from ig2mj.planning.moves import (
     ATTEMPTS,
@@ -22,8 +23,9 @@ from ig2mj.planning.moves import (
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import AWAY, PlannedWorld, Rotation, Stance, Vector, about_vertical, turn_onto
+from ig2mj.planning.world import AWAY, PlannedWorld, Rotation, Stance, Vector
 from ig2mj.scene.tables import LinkKind
 
 
@@ -57,7 +59,7 @@ def _hold_at(
             for offset, tilt in offsets:
                 held = about_vertical(-now) @ offset
                 for point in points:
-                    for stance in world.stances(hand, point, floor, AWAY, STANCES, held):
+                    for stance in stances(world, hand, point, floor, AWAY, STANCES, held):
                         yield stance, point, offset, tilt
 
         def has_way(candidate: _Holding, search: bool, obstacles=obstacles, now=now) -> bool:

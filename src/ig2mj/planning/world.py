@@ -4,30 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
-from ig2mj.agents.humanoid.frames import BODY_HEIGHT
-from ig2mj.agents.humanoid.robot import BODY_RADIUS
 from ig2mj.engine.view import PhysicsView
-from ig2mj.geometry.host_rotations import matrix_to_quat, quat_conjugate, quat_multiply
+from ig2mj.geometry.host_rotations import matrix_to_quat
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.arm_orientations import ARM_TURNS, level_orientations
-from ig2mj.planning.bodies import ALONG, CORNER, Follower, HandedBody, Senses, grip_of, sense
+from ig2mj.planning.bodies import ALONG, Follower, HandedBody, Senses, grip_of, sense
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.footprint import BaseFootprint
-from ig2mj.planning.motion_planner import NEAR_START, FreeFloor, MotionPlanner
-from ig2mj.planning.occupancy import RESOLUTION
+from ig2mj.planning.free_floor import FreeFloor
+from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.stage import Stage
-from ig2mj.predicates.literals import object_index, room_index
-from ig2mj.sampling.placement import Placer
+from ig2mj.predicates.literals import object_index
 from ig2mj.sampling.query import SceneQuery
-from ig2mj.sampling.rules import PLACEMENTS
 from ig2mj.states.definitions.dust import DUST
 from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.particles import world_normals, world_positions
@@ -38,45 +33,11 @@ HELD_POINTS, HELD_MARGIN, LATTICE = 60, 0.012, 0.04
 BODY_SPARE = 0.04
 """m that are left between the body and what it carries."""
 
-APART = 0.12
-"""m between stances for the same point, at least."""
-
-SIDEWAYS = 0.4
-"""Cost of standing with a hand's side to a point. The hand's shoulder, the middle of the sphere that bounds its reach
-(iGibson's behavior_robot.py), is behind the body's axis and to the side, so that the hand reaches 0.3 m farther than
-ahead."""
-
 TUCKED = (0.5, 0.85, 0.22)
 """m: heights of floating hands whose fingers point up, and how far from the body's axis they reach."""
 
-EFFORT = 1.0
-"""m of way that a metre by which the body stoops, or stretches, counts as."""
-
 AWAY, FARTHEST = 0.55, 0.95
 """m, horizontal, that a base would like to be from what its hand does, and from where it puts what is large."""
-
-EASY = 0.35
-"""m, horizontal, from the floor where a robot can stand up to which no spot is harder to reach than another."""
-
-WALL = 0.02
-"""m before a point from which on a wall does not count: a switch is on it."""
-
-EACH, SPREAD = 4, 0.04
-"""Spots of a placement in each area of its rule, and m between them, at least."""
-
-ROOFED, COLUMN = 1.0, np.arange(0.15, 0.8, 0.08)
-"""m of way that a spot counts as farther which nothing can be let down to, and heights above it that are looked at."""
-
-LATER_SPOTS = 12
-"""Candidates of an area of which the predicate is asked, at most."""
-
-TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
-"""rad about the vertical that an object may be turned by, from how it is held in front of the robot."""
-
-ORIENTATIONS, ORIENTATION_SPREAD = 2, 1.7
-"""Orientations at rest that are tried, and rad by which they may be farther from the present one than the nearest."""
-
-UP = np.array([0.0, 0.0, 1.0])
 
 Vector = Float[np.ndarray, "3"]
 Rotation = Float[np.ndarray, "3 3"]
@@ -89,16 +50,6 @@ class Stance:
     xy: tuple[float, float]
     yaw: float
     rise: float = 0.0
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Spot:
-    """Where an object is to be: position (m) and orientation (w-x-y-z) of its main body, world frame; `roofed`: inside
-    something, with a part of it above."""
-
-    pos: Vector
-    quat: Float[np.ndarray, "4"]
-    roofed: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -290,20 +241,6 @@ class PlannedWorld:
                 footprint = footprint.holding(float(corners[:, 2].min()), float(corners[:, 2].max()), away)
         return self.planner.floor(view, footprint, without=[self.index(n) for n in held if n], world=number)
 
-    def clear_with_held(self, stances: Sequence[Stance]) -> bool:
-        """Whether what the robot holds, carried as it is now, meets nothing where the robot stands."""
-        held = [(h, n) for h, n in enumerate(self.held) if n and not self.domain.fixed(n)]
-        obstacles = self.obstacles([n for _, n in held])
-        here, now = self.base
-        for hand, name in held:
-            spheres = self.spheres(*self.hand_axes(hand), holding=name, hand=hand)
-            points = spheres[:, :3] + self.grip(hand) - np.array([*here, 0.0])
-            for stance in stances:
-                there = points @ about_vertical(stance.yaw - now).T + np.array([*stance.xy, 0.0])
-                if not obstacles.clear(np.concatenate([there, spheres[:, 3:]], axis=1)):
-                    return False
-        return True
-
     def away(self, spheres: Float[np.ndarray, "S 4"]) -> float:
         """m, horizontal, that a base would like to be from where a hand puts what it holds, whose spheres these are."""
         return float(min(AWAY + max(np.linalg.norm(spheres[:, :2], axis=1).max() - ALONG[-1], 0.0), FARTHEST))
@@ -353,91 +290,16 @@ class PlannedWorld:
         """Whether a hand reaches a point from a stance."""
         return bool(np.linalg.norm(point - self._from(self.body.shoulders[hand], stance)) <= self.body.reach)
 
-    def stances(
-        self,
-        hand: int,
-        point: Vector,
-        floor: FreeFloor,
-        away: float,
-        most: int = 10,
-        held: Vector | None = None,
-    ) -> Iterator[Stance]:
-        """Where the robot can stand so that a hand reaches a point, the nearest and most comfortable first.
-
-        Args:
-          away: m, horizontal, that the base would like to be from the point.
-          held: what is brought to the point is a part of what the hand holds, and this leads from it to the hand's
-            grasp point, m, in the body's frame.
-        """
-        here, _ = self.base
-        side = self.body.carry[hand][1]
-        away = max(away, self.body.away)
-        cells = floor.within(point[:2], self.body.reach + abs(float(self.body.shoulders[hand][1])))
-        middles = floor.occupancy.middles(cells)
-        offset = point[:2] - middles
-        apart = np.linalg.norm(offset, axis=1)
-        bearing = np.arctan2(offset[:, 1], offset[:, 0])
-        yaw = np.concatenate(
-            [bearing - np.arctan2(0.6 * side, np.maximum(apart, 0.3)), bearing - np.sign(side) * np.pi / 2]
-        )
-        way = floor.distances(here, NEAR_START)[tuple(cells.T)]
-        cost = 0.6 * way + 2.0 * np.abs(apart - away) - 0.5 * np.minimum(floor.spare[tuple(cells.T)], 0.2)
-        cost, middles = np.concatenate([cost, cost + SIDEWAYS]), np.concatenate([middles, middles])
-        target = point if held is None else point + _turned_vectors(yaw, held)
-        rise = self._rise_from(hand, middles, yaw, target)
-        cost += np.where(np.isnan(rise), np.inf, EFFORT * np.abs(rise))
-        count, obstacles = 0, self.obstacles()
-        while len(cost) and np.isfinite(cost[best := int(np.argmin(cost))]):
-            if self.behind_wall(obstacles, middles[best], point) or not self._stretches(
-                obstacles, middles[best], rise[best]
-            ):
-                cost[best] = np.inf
-                continue
-            cost[np.linalg.norm(middles - middles[best], axis=1) < APART] = np.inf
-            yield Stance((float(middles[best][0]), float(middles[best][1])), float(yaw[best]), float(rise[best]))
-            count += 1
-            if count == most:
-                return
-
-    def _stretches(self, obstacles: Obstacles, xy: Float[np.ndarray, "2"], rise: float) -> bool:
-        """Whether there is room above a body that stretches."""
-        if rise <= 0.0:
-            return True
-        top = self.body.stands + BODY_HEIGHT - BODY_RADIUS
-        points = np.array([[*xy, top], [*xy, top + rise]])
-        return bool((obstacles.distance(points) > BODY_RADIUS).all())
-
-    def behind_wall(self, obstacles: Obstacles, xy: Float[np.ndarray, "2"], point: Vector) -> bool:
-        """Whether a wall stands between a robot and a point."""
-        start = np.array([*xy, point[2]])
-        apart = float(np.linalg.norm(point - start))
-        way = (point - start)[None] / max(apart, 1e-9)
-        return any(obstacles.entries(start[None], way, wall)[0] < apart - WALL for wall in self._walls)
-
     def turned_hand(self, hand: int, rotation: Rotation) -> tuple[float, float, float, float]:
         """Orientation of a hand, w-x-y-z, after a rotation."""
         w, x, y, z = matrix_to_quat(rotation @ matrices_on_host(self.hand_quat(hand)[None])[0])
         return (float(w), float(x), float(y), float(z))
 
     @functools.cached_property
-    def _walls(self) -> list[int]:
+    def walls(self) -> list[int]:
+        """Numbers of the walls' objects."""
         tables = self.domain.model.tables
         return [o for o, c in enumerate(tables.object_categories) if c == "walls"]
-
-    def _rise_from(
-        self, hand: int, xy: Float[np.ndarray, "n 2"], yaw: Float[np.ndarray, "n"], point: Float[np.ndarray, "*n 3"]
-    ) -> Float[np.ndarray, "n"]:
-        """How far the body rises so that a hand reaches a point from each of some stances, m; NaN: it does not."""
-        x, y, z = self.body.shoulders[hand]
-        c, s = np.cos(yaw), np.sin(yaw)
-        shoulder = np.stack([xy[:, 0] + c * x - s * y, xy[:, 1] + s * x + c * y], axis=1)
-        away = np.linalg.norm(point[..., :2] - shoulder, axis=1)
-        above = point[..., 2] - (self.body.stands + z)
-        span = np.sqrt(np.maximum(self.body.reach**2 - away**2, 0.0))
-        rise = np.sign(above) * np.maximum(np.abs(above) - span, 0.0)
-        return np.where(
-            (away <= self.body.reach) & (rise >= self.body.rises[0]) & (rise <= self.body.rises[1]), rise, np.nan
-        )
 
     def dirt(self, predicate: str, name: str) -> list[DirtSpot]:
         """Particles that are left on an object: of dust for "dusty", of stains for "stained"; the nearest first."""
@@ -452,149 +314,3 @@ class PlannedWorld:
         here, _ = self.base
         order = sorted(alive.tolist(), key=lambda n: float(np.linalg.norm(pos[n, :2] - here)))
         return [DirtSpot(n, pos[n], normal[n]) for n in order]
-
-    def spots(self, predicate: str, name: str, where: str) -> Iterator[Spot]:
-        """Poses of an object's main body that make a placement true. Orientations in which it rests come first, those
-        nearest to how it is held before others, each turned about the vertical."""
-        self.query.load(self.stage.snapshot(self.world))
-        index = self.index(name)
-        second = room_index(self.domain.model, where) if predicate == "on_floor" else self.index(where)
-        areas = PLACEMENTS[predicate](self.query, index, second)
-        placer, farther = Placer(self.query), self._out_of_reach()
-        middle = self._middle_of_fixed_part(where) if predicate == "inside" else None
-        around = self.obstacles([name])
-        turned = [(quat, angle) for quat in self._upright(name) for angle in TURNS]
-        if self.body.opening is not None:
-            level = level_orientations(self, name) if predicate in ("inside", "under") else []
-            turned = [(quat, angle) for angle in ARM_TURNS for quat in (*level, *self._upright(name))]
-        for quat, angle in turned:
-            new = _yawed(quat, angle)
-            for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
-                found, asked = list[Vector](), 0
-                positions = np.array(list(placer.spots(index, areas, new, self.rng, support))).reshape(-1, 3)
-                cost = farther(positions)
-                roofed = np.zeros(len(positions), bool)
-                if middle is not None:  # below openings, and away from where doors shut
-                    roofed = self._roofed(positions, around)
-                    cost += np.linalg.norm((positions - middle)[:, :2], axis=1) + ROOFED * roofed
-                for k in np.argsort(cost, kind="stable"):
-                    pos = positions[k]
-                    if not np.isfinite(cost[k]) or len(found) == EACH or asked == LATER_SPOTS:
-                        break
-                    if any(np.linalg.norm(pos - other) < SPREAD for other in found):
-                        continue
-                    asked += 1
-                    if predicate in ("on_top", "on_floor") or self._would_hold(predicate, name, where, pos, new):
-                        found.append(pos)
-                        yield Spot(pos, new, bool(roofed[k]))
-                if found:
-                    break
-
-    def _roofed(self, positions: Float[np.ndarray, "n 3"], around: Obstacles) -> Bool[np.ndarray, "n"]:
-        """Above which positions something is in the way of what is let down to them."""
-        if not len(positions):
-            return np.zeros(0, bool)
-        points = positions[:, None] + np.stack([np.zeros(len(COLUMN)), np.zeros(len(COLUMN)), COLUMN], axis=1)
-        return np.any(around.distance(points.reshape(-1, 3)).reshape(points.shape[:2]) < CORNER, axis=1)
-
-    def _out_of_reach(self) -> Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n"]]:
-        """How far positions are from where a hand is comfortable, m, for a robot on floor that it has a way to;
-        infinite: no hand reaches there."""
-        import scipy.ndimage  # takes long to import
-
-        floor, (here, _) = self.floor(), self.base
-        reached = np.isfinite(floor.distances(here, NEAR_START))
-        apart = np.full(reached.shape, np.inf)
-        if reached.any():
-            apart = RESOLUTION * np.asarray(scipy.ndimage.distance_transform_edt(~reached))
-        _, aside, height = np.abs(self.body.shoulders[0])
-        shoulder = self.body.stands + height
-
-        def farther(pos: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
-            if not len(pos):
-                return np.zeros(0)
-            cells = np.clip(floor.occupancy.cells(pos[:, :2]), 0, np.array(reached.shape) - 1)
-            away = apart[tuple(np.moveaxis(cells, -1, 0))]
-            above = pos[:, 2] - shoulder
-            level = np.maximum(away - aside, 0.0)
-            far = np.hypot(level, above - np.clip(above, *self.body.rises)) > self.body.reach
-            return np.where(far, np.inf, np.maximum(away - EASY, 0.0))
-
-        return farther
-
-    def _middle_of_fixed_part(self, name: str) -> Vector:
-        """Of an object without its doors, drawers and lids: middle of its box, m."""
-        tables, model = self.domain.model.tables, self.stage.scene.model
-        index = self.index(name)
-        joints = np.isin(model.jnt_qposadr, tables.openable_qposadr[tables.openable_object == index])
-        own = tables.piece_object == index
-        fixed = np.flatnonzero(own & ~np.isin(tables.piece_body, model.jnt_bodyid[joints]))
-        corners = self.vertices_of_pieces(fixed if len(fixed) else np.flatnonzero(own))
-        return (corners.min(0) + corners.max(0)) / 2
-
-    def _upright(self, name: str) -> list[Float[np.ndarray, "4"]]:
-        """Orientations in which an object rests, each the nearest to its present one; that, where none is known."""
-        _, now = self.pose(name)
-        frame = matrices_on_host(now[None])[0]
-        found = []
-        for entry in self.stage.scene.manifest.objects[self.index(name)].orientations:
-            up = frame @ matrices_on_host(np.array([entry.quat], float))[0][2]  # the vertical of that orientation, now
-            axis, angle = np.cross(up, UP), float(np.arccos(np.clip(up[2], -1.0, 1.0)))
-            axis = axis / np.linalg.norm(axis) if np.linalg.norm(axis) > 1e-6 else np.array([1.0, 0.0, 0.0])
-            tilt = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])
-            found.append((angle, np.asarray(quat_multiply(tilt, now), float)))
-        found.sort(key=lambda pair: pair[0])
-        kept = [quat for angle, quat in found if angle < found[0][0] + ORIENTATION_SPREAD][:ORIENTATIONS]
-        return kept or [now]
-
-    def _would_hold(self, predicate: str, name: str, where: str, pos: Vector, quat: np.ndarray) -> bool:
-        """Whether a placement that does not depend on contact would be true."""
-        before = self.query.save()
-        self.query.place(self.index(name), pos, quat)
-        states = Facts(self.domain, self.stage.states, self.view, self.world).states
-        holds = Facts(self.domain, states, self.query.view).holds(predicate, name, where)
-        self.query.load(before)
-        return holds
-
-    def grip_for(self, hand: int, name: str, spot: Spot) -> tuple[Vector, Float[np.ndarray, "4"], Rotation]:
-        """Grasp point and orientation of a hand that holds an object, if the object were at a spot, and the rotation
-        that brings both there."""
-        own_pos, own_quat = self.pose(name)
-        turn = np.asarray(quat_multiply(spot.quat, quat_conjugate(own_quat)), float)
-        rotation = matrices_on_host(turn[None])[0]
-        target = spot.pos + rotation @ (self.grip(hand) - own_pos)
-        return target, np.asarray(quat_multiply(turn, self.hand_quat(hand)), float), rotation
-
-
-def _turned_vectors(yaw: Float[np.ndarray, "n"], vector: Vector) -> Float[np.ndarray, "n 3"]:
-    """A vector turned about the vertical by each of some angles, rad."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    x, y, z = vector
-    return np.stack([c * x - s * y, s * x + c * y, np.full(len(yaw), z)], axis=1)
-
-
-def about_vertical(angle: float) -> Rotation:
-    """Rotation matrix."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def turn_onto(one: Vector, other: Vector) -> Rotation:
-    """The least rotation from one direction to another."""
-    a, b = one / np.linalg.norm(one), other / np.linalg.norm(other)
-    axis, cos = np.cross(a, b), float(a @ b)
-    if cos < -0.999:
-        side = np.cross(a, UP) if abs(a @ UP) < 0.9 else np.array([1.0, 0.0, 0.0])
-        side = side / np.linalg.norm(side)
-        return 2 * np.outer(side, side) - np.eye(3)
-    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + k + k @ k / (1 + cos)
-
-
-def _turn(angle: float) -> Float[np.ndarray, "4"]:
-    return np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
-
-
-def _yawed(quat: Float[np.ndarray, "4"], angle: float) -> Float[np.ndarray, "4"]:
-    turned = np.asarray(quat_multiply(_turn(angle), quat), float)
-    return turned / np.linalg.norm(turned)

@@ -1,0 +1,176 @@
+"""Where an object is put so that a placement predicate holds."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, yaw_quat
+from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.planning.arm_orientations import ARM_TURNS, level_orientations
+from ig2mj.planning.bodies import CORNER
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.facts import Facts
+from ig2mj.planning.free_floor import NEAR_START
+from ig2mj.planning.occupancy import RESOLUTION
+from ig2mj.planning.world import PlannedWorld, Rotation, Vector
+from ig2mj.predicates.literals import room_index
+from ig2mj.sampling.placement import Placer
+from ig2mj.sampling.rules import PLACEMENTS
+
+EASY = 0.35
+"""m, horizontal, from the floor where a robot can stand up to which no spot is harder to reach than another."""
+
+EACH, SPREAD = 4, 0.04
+"""Spots of a placement in each area of its rule, and m between them, at least."""
+
+ROOFED, COLUMN = 1.0, np.arange(0.15, 0.8, 0.08)
+"""m of way that a spot counts as farther which nothing can be let down to, and heights above it that are looked at."""
+
+LATER_SPOTS = 12
+"""Candidates of an area of which the predicate is asked, at most."""
+
+TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
+"""rad about the vertical that an object may be turned by, from how it is held in front of the robot."""
+
+ORIENTATIONS, ORIENTATION_SPREAD = 2, 1.7
+"""Orientations at rest that are tried, and rad by which they may be farther from the present one than the nearest."""
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Spot:
+    """Where an object is to be: position (m) and orientation (w-x-y-z) of its main body, world frame; `roofed`: inside
+    something, with a part of it above."""
+
+    pos: Vector
+    quat: Float[np.ndarray, "4"]
+    roofed: bool = False
+
+
+def spots_for(world: PlannedWorld, predicate: str, name: str, where: str) -> Iterator[Spot]:
+    """Poses of an object's main body that make a placement true. Orientations in which it rests come first, those
+    nearest to how it is held before others, each turned about the vertical."""
+    world.query.load(world.stage.snapshot(world.world))
+    index = world.index(name)
+    second = room_index(world.domain.model, where) if predicate == "on_floor" else world.index(where)
+    areas = PLACEMENTS[predicate](world.query, index, second)
+    placer, farther = Placer(world.query), _out_of_reach(world)
+    middle = _middle_of_fixed_part(world, where) if predicate == "inside" else None
+    around = world.obstacles([name])
+    turned = [(quat, angle) for quat in _upright(world, name) for angle in TURNS]
+    if world.body.opening is not None:
+        level = level_orientations(world, name) if predicate in ("inside", "under") else []
+        turned = [(quat, angle) for angle in ARM_TURNS for quat in (*level, *_upright(world, name))]
+    for quat, angle in turned:
+        new = _yawed(quat, angle)
+        for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
+            found, asked = list[Vector](), 0
+            positions = np.array(list(placer.spots(index, areas, new, world.rng, support))).reshape(-1, 3)
+            cost = farther(positions)
+            roofed = np.zeros(len(positions), bool)
+            if middle is not None:  # below openings, and away from where doors shut
+                roofed = _roofed(world, positions, around)
+                cost += np.linalg.norm((positions - middle)[:, :2], axis=1) + ROOFED * roofed
+            for k in np.argsort(cost, kind="stable"):
+                pos = positions[k]
+                if not np.isfinite(cost[k]) or len(found) == EACH or asked == LATER_SPOTS:
+                    break
+                if any(np.linalg.norm(pos - other) < SPREAD for other in found):
+                    continue
+                asked += 1
+                if predicate in ("on_top", "on_floor") or _would_hold(world, predicate, name, where, pos, new):
+                    found.append(pos)
+                    yield Spot(pos, new, bool(roofed[k]))
+            if found:
+                break
+
+
+def grip_for(world: PlannedWorld, hand: int, name: str, spot: Spot) -> tuple[Vector, Float[np.ndarray, "4"], Rotation]:
+    """Grasp point and orientation of a hand that holds an object, if the object were at a spot, and the rotation
+    that brings both there."""
+    own_pos, own_quat = world.pose(name)
+    turn = np.asarray(quat_multiply(spot.quat, quat_conjugate(own_quat)), float)
+    rotation = matrices_on_host(turn[None])[0]
+    target = spot.pos + rotation @ (world.grip(hand) - own_pos)
+    return target, np.asarray(quat_multiply(turn, world.hand_quat(hand)), float), rotation
+
+
+def _roofed(world: PlannedWorld, positions: Float[np.ndarray, "n 3"], around: Obstacles) -> Bool[np.ndarray, "n"]:
+    """Above which positions something is in the way of what is let down to them."""
+    if not len(positions):
+        return np.zeros(0, bool)
+    points = positions[:, None] + np.stack([np.zeros(len(COLUMN)), np.zeros(len(COLUMN)), COLUMN], axis=1)
+    return np.any(around.distance(points.reshape(-1, 3)).reshape(points.shape[:2]) < CORNER, axis=1)
+
+
+def _out_of_reach(world: PlannedWorld) -> Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n"]]:
+    """How far positions are from where a hand is comfortable, m, for a robot on floor that it has a way to;
+    infinite: no hand reaches there."""
+    import scipy.ndimage  # takes long to import
+
+    floor, (here, _) = world.floor(), world.base
+    reached = np.isfinite(floor.distances(here, NEAR_START))
+    apart = np.full(reached.shape, np.inf)
+    if reached.any():
+        apart = RESOLUTION * np.asarray(scipy.ndimage.distance_transform_edt(~reached))
+    _, aside, height = np.abs(world.body.shoulders[0])
+    shoulder = world.body.stands + height
+
+    def farther(pos: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
+        if not len(pos):
+            return np.zeros(0)
+        cells = np.clip(floor.occupancy.cells(pos[:, :2]), 0, np.array(reached.shape) - 1)
+        away = apart[tuple(np.moveaxis(cells, -1, 0))]
+        above = pos[:, 2] - shoulder
+        level = np.maximum(away - aside, 0.0)
+        far = np.hypot(level, above - np.clip(above, *world.body.rises)) > world.body.reach
+        return np.where(far, np.inf, np.maximum(away - EASY, 0.0))
+
+    return farther
+
+
+def _middle_of_fixed_part(world: PlannedWorld, name: str) -> Vector:
+    """Of an object without its doors, drawers and lids: middle of its box, m."""
+    tables, model = world.domain.model.tables, world.stage.scene.model
+    index = world.index(name)
+    joints = np.isin(model.jnt_qposadr, tables.openable_qposadr[tables.openable_object == index])
+    own = tables.piece_object == index
+    fixed = np.flatnonzero(own & ~np.isin(tables.piece_body, model.jnt_bodyid[joints]))
+    corners = world.vertices_of_pieces(fixed if len(fixed) else np.flatnonzero(own))
+    return (corners.min(0) + corners.max(0)) / 2
+
+
+def _upright(world: PlannedWorld, name: str) -> list[Float[np.ndarray, "4"]]:
+    """Orientations in which an object rests, each the nearest to its present one; that, where none is known."""
+    _, now = world.pose(name)
+    frame = matrices_on_host(now[None])[0]
+    found = []
+    for entry in world.stage.scene.manifest.objects[world.index(name)].orientations:
+        up = frame @ matrices_on_host(np.array([entry.quat], float))[0][2]  # the vertical of that orientation, now
+        axis, angle = np.cross(up, UP), float(np.arccos(np.clip(up[2], -1.0, 1.0)))
+        axis = axis / np.linalg.norm(axis) if np.linalg.norm(axis) > 1e-6 else np.array([1.0, 0.0, 0.0])
+        tilt = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])
+        found.append((angle, np.asarray(quat_multiply(tilt, now), float)))
+    found.sort(key=lambda pair: pair[0])
+    kept = [quat for angle, quat in found if angle < found[0][0] + ORIENTATION_SPREAD][:ORIENTATIONS]
+    return kept or [now]
+
+
+def _would_hold(world: PlannedWorld, predicate: str, name: str, where: str, pos: Vector, quat: np.ndarray) -> bool:
+    """Whether a placement that does not depend on contact would be true."""
+    before = world.query.save()
+    world.query.place(world.index(name), pos, quat)
+    states = Facts(world.domain, world.stage.states, world.view, world.world).states
+    holds = Facts(world.domain, states, world.query.view).holds(predicate, name, where)
+    world.query.load(before)
+    return holds
+
+
+def _yawed(quat: Float[np.ndarray, "4"], angle: float) -> Float[np.ndarray, "4"]:
+    turned = np.asarray(quat_multiply(yaw_quat(angle), quat), float)
+    return turned / np.linalg.norm(turned)

@@ -1,0 +1,135 @@
+"""Where a robot stands so that a hand reaches a point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.agents.humanoid.frames import BODY_HEIGHT
+from ig2mj.agents.humanoid.robot import BODY_RADIUS
+from ig2mj.geometry.host_rotations import about_vertical
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.free_floor import NEAR_START, FreeFloor
+from ig2mj.planning.world import PlannedWorld, Stance, Vector
+
+APART = 0.12
+"""m between stances for the same point, at least."""
+
+SIDEWAYS = 0.4
+"""Cost of standing with a hand's side to a point. The hand's shoulder, the middle of the sphere that bounds its reach
+(iGibson's behavior_robot.py), is behind the body's axis and to the side, so that the hand reaches 0.3 m farther than
+ahead."""
+
+EFFORT = 1.0
+"""m of way that a metre by which the body stoops, or stretches, counts as."""
+
+WALL = 0.02
+"""m before a point from which on a wall does not count: a switch is on it."""
+
+
+def stances(
+    world: PlannedWorld,
+    hand: int,
+    point: Vector,
+    floor: FreeFloor,
+    away: float,
+    most: int = 10,
+    held: Vector | None = None,
+) -> Iterator[Stance]:
+    """Where the robot can stand so that a hand reaches a point, the nearest and most comfortable first.
+
+    Args:
+      away: m, horizontal, that the base would like to be from the point.
+      held: what is brought to the point is a part of what the hand holds, and this leads from it to the hand's
+        grasp point, m, in the body's frame.
+    """
+    here, _ = world.base
+    side = world.body.carry[hand][1]
+    away = max(away, world.body.away)
+    cells = floor.within(point[:2], world.body.reach + abs(float(world.body.shoulders[hand][1])))
+    middles = floor.occupancy.middles(cells)
+    offset = point[:2] - middles
+    apart = np.linalg.norm(offset, axis=1)
+    bearing = np.arctan2(offset[:, 1], offset[:, 0])
+    yaw = np.concatenate(
+        [bearing - np.arctan2(0.6 * side, np.maximum(apart, 0.3)), bearing - np.sign(side) * np.pi / 2]
+    )
+    way = floor.distances(here, NEAR_START)[tuple(cells.T)]
+    cost = 0.6 * way + 2.0 * np.abs(apart - away) - 0.5 * np.minimum(floor.spare[tuple(cells.T)], 0.2)
+    cost, middles = np.concatenate([cost, cost + SIDEWAYS]), np.concatenate([middles, middles])
+    target = point if held is None else point + _turned_vectors(yaw, held)
+    rise = _rise_from(world, hand, middles, yaw, target)
+    cost += np.where(np.isnan(rise), np.inf, EFFORT * np.abs(rise))
+    count, obstacles = 0, world.obstacles()
+    while len(cost) and np.isfinite(cost[best := int(np.argmin(cost))]):
+        if behind_wall(world, obstacles, middles[best], point) or not _stretches(
+            world, obstacles, middles[best], rise[best]
+        ):
+            cost[best] = np.inf
+            continue
+        cost[np.linalg.norm(middles - middles[best], axis=1) < APART] = np.inf
+        yield Stance((float(middles[best][0]), float(middles[best][1])), float(yaw[best]), float(rise[best]))
+        count += 1
+        if count == most:
+            return
+
+
+def behind_wall(world: PlannedWorld, obstacles: Obstacles, xy: Float[np.ndarray, "2"], point: Vector) -> bool:
+    """Whether a wall stands between a robot and a point."""
+    start = np.array([*xy, point[2]])
+    apart = float(np.linalg.norm(point - start))
+    way = (point - start)[None] / max(apart, 1e-9)
+    return any(obstacles.entries(start[None], way, wall)[0] < apart - WALL for wall in world.walls)
+
+
+def clear_with_held(world: PlannedWorld, stances: Sequence[Stance]) -> bool:
+    """Whether what the robot holds, carried as it is now, meets nothing where the robot stands."""
+    held = [(h, n) for h, n in enumerate(world.held) if n and not world.domain.fixed(n)]
+    obstacles = world.obstacles([n for _, n in held])
+    here, now = world.base
+    for hand, name in held:
+        spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
+        points = spheres[:, :3] + world.grip(hand) - np.array([*here, 0.0])
+        for stance in stances:
+            there = points @ about_vertical(stance.yaw - now).T + np.array([*stance.xy, 0.0])
+            if not obstacles.clear(np.concatenate([there, spheres[:, 3:]], axis=1)):
+                return False
+    return True
+
+
+def _stretches(world: PlannedWorld, obstacles: Obstacles, xy: Float[np.ndarray, "2"], rise: float) -> bool:
+    """Whether there is room above a body that stretches."""
+    if rise <= 0.0:
+        return True
+    top = world.body.stands + BODY_HEIGHT - BODY_RADIUS
+    points = np.array([[*xy, top], [*xy, top + rise]])
+    return bool((obstacles.distance(points) > BODY_RADIUS).all())
+
+
+def _rise_from(
+    world: PlannedWorld,
+    hand: int,
+    xy: Float[np.ndarray, "n 2"],
+    yaw: Float[np.ndarray, "n"],
+    point: Float[np.ndarray, "*n 3"],
+) -> Float[np.ndarray, "n"]:
+    """How far the body rises so that a hand reaches a point from each of some stances, m; NaN: it does not."""
+    x, y, z = world.body.shoulders[hand]
+    c, s = np.cos(yaw), np.sin(yaw)
+    shoulder = np.stack([xy[:, 0] + c * x - s * y, xy[:, 1] + s * x + c * y], axis=1)
+    away = np.linalg.norm(point[..., :2] - shoulder, axis=1)
+    above = point[..., 2] - (world.body.stands + z)
+    span = np.sqrt(np.maximum(world.body.reach**2 - away**2, 0.0))
+    rise = np.sign(above) * np.maximum(np.abs(above) - span, 0.0)
+    return np.where(
+        (away <= world.body.reach) & (rise >= world.body.rises[0]) & (rise <= world.body.rises[1]), rise, np.nan
+    )
+
+
+def _turned_vectors(yaw: Float[np.ndarray, "n"], vector: Vector) -> Float[np.ndarray, "n 3"]:
+    """A vector turned about the vertical by each of some angles, rad."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    x, y, z = vector
+    return np.stack([c * x - s * y, s * x + c * y, np.full(len(yaw), z)], axis=1)
