@@ -15,6 +15,7 @@ from tiny_home import write_tiny_home
 import ig2mj
 from ig2mj.agents.base import Controller, Robot
 from ig2mj.agents.urdf import Layout, UrdfRobot
+from ig2mj.agents.urdf.base_motion import drive
 from ig2mj.cli import call
 from ig2mj.errors import EngineError, InputError, UnknownNameError
 
@@ -57,7 +58,7 @@ def test_it_is_a_robot_and_its_parts_are_found_by_name(folder, world):
     )
     names = ("forward", "turn_left", "shoulder_pan", "lift", "wrist", "gripper")
     assert world.controller.action_names == names
-    assert robot.body.drive(robot.layout) == pytest.approx((0.06, 0.32, 12.0))
+    assert drive(robot.body, robot.layout) == pytest.approx((0.06, 0.32, 12.0))
 
 
 def test_it_stands_still_and_drives_where_it_is_told(rover):

@@ -13,6 +13,7 @@ from urdf_parts import converted, follows, gripper, joint, link, wheel
 
 import ig2mj
 from ig2mj.agents.urdf import Layout, UrdfRobot
+from ig2mj.agents.urdf.base_motion import drive
 from ig2mj.agents.urdf.references import Coupling
 from ig2mj.errors import InputError, UnknownNameError
 
@@ -184,7 +185,7 @@ def test_four_wheels_drive_as_two_sides(tmp_path, home):
             parts += wheel(f"{end}_{side}_wheel", f"{x} {y} -0.06")
     robot = UrdfRobot.load(converted(tmp_path, *parts, name="husky"))
     assert robot.layout.wheels == tuple(f"{end}_{side}_wheel_joint" for side in sides for end in ("front", "rear"))
-    assert robot.body.drive(robot.layout)[1] == pytest.approx(0.24)
+    assert drive(robot.body, robot.layout)[1] == pytest.approx(0.24)
     world = Stepped(home, robot.at(-1.0, 0.5, 0.0))
     start = world.data.body("husky").xpos.copy()
     world.run(1.0, **{f"husky_{name}": 3.0 for name in robot.layout.wheels})

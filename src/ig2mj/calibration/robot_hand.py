@@ -132,8 +132,10 @@ def hand_of(robot: UrdfRobot) -> Hand:
         ahead = point - across * (point @ across)
         ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-9)
         places = [pos + turn @ (point + a * ahead + b * np.cross(ahead, across)) for a in NEAR for b in NEAR]
-        found = [body.free_way(fingers, robot.name, place, turn @ across, open_data) for place in places]
-        opening = min((way for way in found if way is not None), default=body.gap(*fingers, robot.name, open_data))
+        found = [body.shapes.free_way(fingers, robot.name, place, turn @ across, open_data) for place in places]
+        opening = min(
+            (way for way in found if way is not None), default=body.shapes.gap(*fingers, robot.name, open_data)
+        )
     if suction:
         approach = across
         across = np.cross(approach, np.eye(3)[int(np.argmin(np.abs(approach)))])

@@ -405,7 +405,7 @@ def _clearance(body: RobotBody, layout: Layout, start: Mapping[str, float]) -> f
     floor = -body.standing(layout)
     lows = []
     for link in body.moved_by(layout.arm[1:] or layout.arm):  # the first joint of most arms only turns them
-        points, (pos, turn) = body.points(link), body.pose(link, data)
+        points, (pos, turn) = body.shapes.points(link), body.pose(link, data)
         if len(points):
             lows.append(float((pos[2] + points @ turn[2]).min()))
     return min(lows, default=np.inf) - floor

@@ -14,26 +14,15 @@ import numpy as np
 from ig2mj.agents.kinematics import Chain
 from ig2mj.agents.urdf.description import Description, RobotJoint
 from ig2mj.agents.urdf.layout import Gripper, Layout
+from ig2mj.agents.urdf.link_shapes import LinkShapes
 from ig2mj.agents.urdf.linkages import close_linkages
-from ig2mj.agents.urdf.references import (
-    couplings_of,
-)
+from ig2mj.agents.urdf.references import couplings_of
 from ig2mj.errors import InputError
 from ig2mj.scene.mjcf_files import read_mjcf
 
 MODEL_FILE = "object.xml"
 
 SCALAR = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-
-GLIDE_SPEED, GLIDE_TURN, GLIDE_ACCELERATION = 1.0, 2.0, 4.0
-"""m/s, rad/s and m/s2: most of an omnidirectional base."""
-
-ROUND = (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE)
-
-EDGE_POINTS = 11
-"""Of each line between two corners of a shape, its ends among them."""
-
-SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 
 
 class RobotBody:
@@ -42,7 +31,7 @@ class RobotBody:
     Attributes:
       file: its MJCF. description: what `robot.json` says of it. model: compiled; not to be changed.
       height: m of the base's frame above the floor that it stands on, at joint positions 0. base: the root link.
-      couplings: joints that follow others (`<mimic>`), by name.
+      couplings: joints that follow others (`<mimic>`), by name. shapes: collision geometry of its links.
     """
 
     def __init__(self, folder: pathlib.Path, description: Description):
@@ -54,6 +43,7 @@ class RobotBody:
             self.model = mujoco.MjModel.from_xml_path(str(self.file))
         except (ValueError, OSError) as e:
             raise InputError(self.file, f"MuJoCo cannot load it: {e}", fix="convert the robot again") from e
+        self.shapes = LinkShapes(self.model, self.base, self._own)
         self._data = mujoco.MjData(self.model)
         self._data.qpos[:] = self.model.qpos0
         mujoco.mj_forward(self.model, self._data)
@@ -180,7 +170,7 @@ class RobotBody:
 
     def lowest(self, link: str) -> float | None:
         """m: height in the base's frame of a link's lowest point; None where it has no shape."""
-        points, (pos, turn) = self.points(link), self.pose(link)
+        points, (pos, turn) = self.shapes.points(link), self.pose(link)
         return None if not len(points) else float((pos[2] + points @ turn[2]).min())
 
     @functools.cached_property
@@ -214,26 +204,6 @@ class RobotBody:
                 link = above[link].parent
         return found
 
-    def drive(self, layout: Layout) -> tuple[float, float, float]:
-        """Radius of the wheels and distance between both sides (m), and their largest speed (rad/s)."""
-        hubs = np.array([self.pose(self.description.joint(name).child)[0] for name in layout.wheels])
-        left, right = hubs.reshape(2, -1, 3).mean(1)
-        radius = float(np.mean(hubs[:, 2])) + self.standing(layout)
-        speed = min(self.description.joint(name).speed for name in layout.wheels)
-        return radius, float(np.linalg.norm(left - right)), speed
-
-    def glide(self, layout: Layout) -> tuple[float, float, float]:
-        """Largest speeds of an omnidirectional base (m/s and rad/s), and the force that drives it (N)."""
-        speed, arm, push = GLIDE_SPEED, 0.0, 0.0
-        if layout.wheels:
-            joints = [self.description.joint(name) for name in layout.wheels]
-            hubs = np.array([self.hub(joint.name) for joint in joints])
-            radius = max(float(np.mean(hubs[:, 2])) + self.standing(layout), 0.01)
-            arm = float(np.linalg.norm(hubs[:, :2] - hubs[:, :2].mean(0), axis=1).mean())
-            speed = min(GLIDE_SPEED, radius * min(joint.speed for joint in joints))
-            push = sum(joint.force for joint in joints) / radius
-        return speed, min(GLIDE_TURN, speed / max(arm, 0.1)), min(push or np.inf, self.mass * GLIDE_ACCELERATION)
-
     @property
     def mass(self) -> float:
         """kg of the whole robot."""
@@ -256,12 +226,6 @@ class RobotBody:
             total += float(own[2, 2] + self.model.body_mass[body] * (away[0] ** 2 + away[1] ** 2))
         return total
 
-    def wheel_signs(self, layout: Layout) -> np.ndarray:
-        """1 for a wheel whose joint turns about the robot's y axis, -1 for one that turns the other way."""
-        names = [f"{self.description.name}_{name}" for name in layout.wheels]
-        left = self._data.body(self._own(self.base)).xmat.reshape(3, 3)[:, 1]
-        return np.array([1.0 if self._data.joint(n).xaxis @ left >= 0 else -1.0 for n in names])
-
     def fingers(self, gripper: Gripper) -> list[str]:
         """Links that a gripper's joints move, those of joints that follow them, and passive ones of a linkage on the
         same hand; in the order of the file's."""
@@ -282,32 +246,11 @@ class RobotBody:
             link = above[link]
         return link
 
-    def has_shape(self, link: str) -> bool:
-        """It collides."""
-        body = self.model.body(self._own(link)).id
-        return bool(np.any((self.model.geom_bodyid == body) & (self.model.geom_contype > 0)))
-
     def frame(self, link: str) -> tuple[str, np.ndarray, np.ndarray]:
         """The link that moves a link, and where it is in that one's frame: m, w-x-y-z."""
         entry, quat = self.description.frames[link], np.zeros(4)
         mujoco.mju_mat2Quat(quat, np.array(entry.axes).ravel())
         return entry.on, np.array(entry.pos), quat
-
-    def box(self, link: str) -> tuple[np.ndarray, np.ndarray]:
-        """Centre and half size [3] of the collision geometry in the link's frame; m."""
-        model, corners = self.model, []
-        body = model.body(self._own(link)).id
-        for geom in np.flatnonzero((model.geom_bodyid == body) & (model.geom_contype > 0)):
-            centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
-            turn = np.zeros(9)
-            mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-            matrix = turn.reshape(3, 3)
-            middle, reach = model.geom_pos[geom] + matrix @ centre, np.abs(matrix) @ half
-            corners += [middle - reach, middle + reach]
-        if not corners:
-            return np.zeros(3), np.full(3, 0.01)
-        low, high = np.min(corners, 0), np.max(corners, 0)
-        return (low + high) / 2, (high - low) / 2
 
     def pose(self, link: str, data: Any = None) -> tuple[np.ndarray, np.ndarray]:
         """Position [3] and rotation matrix of a link that moves, in the base's frame. data: of `posed`."""
@@ -332,89 +275,6 @@ class RobotBody:
         """Hinges and slides, in the model's order."""
         prefix = f"{self.description.name}_"
         return [self.model.joint(j).name.removeprefix(prefix) for j in self._scalar]
-
-    def points(self, link: str) -> np.ndarray:
-        """Corners [n, 3] of a link's collision geometry, in its frame, m: vertices of meshes, corners of the boxes
-        round other shapes; of spheres the ends of their axes."""
-        return np.concatenate([np.zeros((0, 3)), *self._corners(link)])
-
-    def edge_points(self, link: str) -> np.ndarray:
-        """Points [n, 3] on and in a link's collision geometry, in its frame, m: `EDGE_POINTS` on each line between two
-        corners of a shape."""
-        shares, found = np.linspace(0, 1, EDGE_POINTS)[:, None, None], [self.points(link)]
-        for corners in self._corners(link):
-            one, two = np.triu_indices(len(corners), 1)
-            found.append((corners[one] + shares * (corners[two] - corners[one])).reshape(-1, 3))
-        return np.concatenate(found)
-
-    def _corners(self, link: str) -> list[np.ndarray]:
-        """See `points`: of each shape."""
-        model, found = self.model, []
-        body = model.body(self._own(link)).id
-        for geom in np.flatnonzero((model.geom_bodyid == body) & (model.geom_contype > 0)):
-            turn = np.zeros(9)
-            mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-            mesh = int(model.geom_dataid[geom])
-            if mesh >= 0:
-                first = model.mesh_vertadr[mesh]
-                corners = np.array(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], float)
-            elif mujoco.mjtGeom(int(model.geom_type[geom])) == mujoco.mjtGeom.mjGEOM_SPHERE:
-                corners = np.concatenate([np.eye(3), -np.eye(3)]) * model.geom_size[geom, 0]
-            elif mujoco.mjtGeom(int(model.geom_type[geom])) in ROUND:
-                radius, half = model.geom_size[geom, :2]
-                if mujoco.mjtGeom(int(model.geom_type[geom])) == mujoco.mjtGeom.mjGEOM_CAPSULE:
-                    half += radius
-                around = np.arange(16) * (np.pi / 8)
-                ring = np.stack([np.cos(around) * radius, np.sin(around) * radius, np.full(16, half)], 1)
-                corners = np.concatenate([ring, ring * (1, 1, -1)])
-            else:
-                corners = SIGNS * model.geom_aabb[geom, 3:] + model.geom_aabb[geom, :3]
-            found.append(model.geom_pos[geom] + corners @ turn.reshape(3, 3).T)
-        return found
-
-    def _geoms(self, names: Collection[str], agent: str) -> list[int]:
-        """Collision geoms of links, by their bodies' names in a scene."""
-        links = {self.base if name == agent else name.removeprefix(f"{agent}_") for name in names}
-        bodies = {self.model.body(self._own(link)).id for link in links}
-        return [
-            g for g in range(self.model.ngeom) if self.model.geom_bodyid[g] in bodies and self.model.geom_contype[g] > 0
-        ]
-
-    def gap(self, some: Collection[str], others: Collection[str], agent: str, data: Any) -> float:
-        """m between the nearest points of two groups of links, by their bodies' names in a scene. data: of `posed`."""
-        fromto = np.zeros(6)
-        pairs = [(one, two) for one in self._geoms(some, agent) for two in self._geoms(others, agent)]
-        return min((mujoco.mj_geomDistance(self.model, data, *pair, 0.5, fromto) for pair in pairs), default=0.0)
-
-    def free_way(
-        self, sides: tuple[Collection[str], Collection[str]], agent: str, point: np.ndarray, way: np.ndarray, data: Any
-    ) -> float | None:
-        """m of free line through a point between two groups of links, by their bodies' names in a scene; None: it meets
-        none of one group, or the point lies inside of one.
-
-        Args:
-          point: in the base's frame. way: unit vector from the first group to the second. data: of `posed`.
-        """
-        base = data.body(self._own(self.base))
-        turn = base.xmat.reshape(3, 3)
-        start, along, total = base.xpos + turn @ point, turn @ way, 0.0
-        for names, direction in zip(sides, (-along, along), strict=True):
-            geoms = self._geoms(names, agent)
-            ahead = {g: self._ray(g, start, direction, data) for g in geoms}
-            if any(at >= 0 and self._ray(g, start, -direction, data) >= 0 for g, at in ahead.items()):
-                return None
-            if not (hits := [at for at in ahead.values() if at >= 0]):
-                return None
-            total += min(hits)
-        return total
-
-    def _ray(self, geom: int, start: np.ndarray, direction: np.ndarray, data: Any) -> float:
-        """m to a geom; -1 where the ray does not meet it."""
-        model, kind = self.model, mujoco.mjtGeom(int(self.model.geom_type[geom]))
-        if kind == mujoco.mjtGeom.mjGEOM_MESH:
-            return mujoco.mj_rayMesh(model, data, geom, start, direction)
-        pos, turn = data.geom_xpos[geom], data.geom_xmat[geom]
-        return mujoco.mju_rayGeom(pos, turn, model.geom_size[geom], start, direction, kind)
 
     def chain(self, layout: Layout, hand: str) -> Chain | None:
         """The arm's joints from the base to a hand, frames parallel at joint positions 0; None where there are none."""

@@ -26,6 +26,7 @@ from jaxtyping import Bool, Float
 from ig2mj.agents.base import HandReading
 from ig2mj.agents.controllers import differential_drive, drive_limits, wheel_odometry
 from ig2mj.agents.kinematics import Chain, forward
+from ig2mj.agents.urdf.base_motion import drive, glide, wheel_signs
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.description import Description
 from ig2mj.agents.urdf.layout import OMNIDIRECTIONAL, Layout
@@ -112,9 +113,9 @@ class UrdfController:
         self._open = np.where(closes_low, ends[:, 1], ends[:, 0])
         self._closed = np.where(closes_low, ends[:, 0], ends[:, 1])
         self._start = np.array([body.start_of(n, layout) for n in (*layout.arm, *layout.gripper)], np.float32)
-        self._drive = body.drive(layout) if layout.wheels and not glides else None
-        self._signs, self._each_side = body.wheel_signs(layout), len(layout.wheels) // 2
-        self._glides = np.array(body.glide(layout)[:2], np.float32)[[0, 0, 1]] if glides else None
+        self._drive = drive(body, layout) if layout.wheels and not glides else None
+        self._signs, self._each_side = wheel_signs(body, layout), len(layout.wheels) // 2
+        self._glides = np.array(glide(body, layout)[:2], np.float32)[[0, 0, 1]] if glides else None
         if self._drive is not None:
             self._speeds = drive_limits(*self._drive).astype(np.float32)
         self._chains = [(body.chain(layout, link), np.array(body.chain_joints(layout, link), int)) for link in hands]

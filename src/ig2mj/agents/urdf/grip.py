@@ -79,21 +79,21 @@ def _opening(body: RobotBody, gripper: Gripper, data: mujoco.MjData) -> float:
     if len(tips) == 1:
         tip = _to_base(body, tips[0], _outermost(body, tips[0])[None], data)
         return float(np.linalg.norm(_to_base(body, *_palm_points(body, gripper), data) - tip, axis=1).min())
-    middles = [_to_base(body, tip, body.box(tip)[0][None], data)[0] for tip in tips]
+    middles = [_to_base(body, tip, body.shapes.box(tip)[0][None], data)[0] for tip in tips]
     apart = [float(np.linalg.norm(a - b)) for a, b in itertools.combinations(middles, 2)]
     return float(np.mean(apart)) if apart else 0.0
 
 
 def _outermost(body: RobotBody, finger: str) -> np.ndarray:
     """The point [3] of a finger that is farthest from its joint, in its frame."""
-    points = body.points(finger)
+    points = body.shapes.points(finger)
     return points[np.argmax(np.linalg.norm(points, axis=1))]
 
 
 def _palm_points(body: RobotBody, gripper: Gripper) -> tuple[str, np.ndarray]:
     """The link that moves a hand, and its points."""
     hand = body.frame(gripper.hand)[0]
-    points = body.points(hand)
+    points = body.shapes.points(hand)
     return hand, points if len(points) else np.zeros((1, 3))
 
 
@@ -124,7 +124,7 @@ def gripper_rays(name: str, body: RobotBody, gripper: Gripper) -> HandRays | Non
         one, starts, others = tips[0], *_against_palm(body, gripper, tips[0], data)
     else:
         one, opposite = _opposed(body, tips, data)
-        middles = {tip: _to_base(body, tip, body.box(tip)[0][None], data)[0] for tip in tips}
+        middles = {tip: _to_base(body, tip, body.shapes.box(tip)[0][None], data)[0] for tip in tips}
         towards = np.mean([middles[other] for other in opposite], axis=0)
         palm = body.pose(hand, data)[0]
         starts = _face(body, gripper, one, towards - middles[one], palm, data)
@@ -144,7 +144,7 @@ def gripper_rays(name: str, body: RobotBody, gripper: Gripper) -> HandRays | Non
 
 def _opposed(body: RobotBody, tips: list[str], data: mujoco.MjData) -> tuple[str, list[str]]:
     """The finger that stands apart from the others, and the two nearest to it of those; the first of two."""
-    middles = {tip: _to_base(body, tip, body.box(tip)[0][None], data)[0] for tip in tips}
+    middles = {tip: _to_base(body, tip, body.shapes.box(tip)[0][None], data)[0] for tip in tips}
     apart = {t: sum(float(np.linalg.norm(middles[t] - middles[o])) for o in tips) for t in tips}
     one = max(tips, key=lambda tip: ("thumb" in tip.lower(), round(apart[tip], 6))) if len(tips) > 2 else tips[0]
     others = sorted((t for t in tips if t != one), key=lambda t: float(np.linalg.norm(middles[t] - middles[one])))
@@ -158,7 +158,7 @@ def _face(
 
     inward: in the base's frame. palm: where the hand is, in the base's frame, m.
     """
-    (pos, turn), points = body.pose(link, data), body.edge_points(link)
+    (pos, turn), points = body.pose(link, data), body.shapes.edge_points(link)
     local = turn.T @ inward
     outward = points.mean(0) - turn.T @ (palm - pos)
     along = local / max(float(np.linalg.norm(local)), 1e-9)
@@ -166,7 +166,9 @@ def _face(
     outward = outward / max(float(np.linalg.norm(outward)), 1e-9)
     branch = body.branch(link, gripper)
     inner = [part for part in body.fingers(gripper) if part != link and body.branch(part, gripper) == branch]
-    whole = np.concatenate([points, *((_to_base(body, part, body.points(part), data) - pos) @ turn for part in inner)])
+    whole = np.concatenate(
+        [points, *((_to_base(body, part, body.shapes.points(part), data) - pos) @ turn for part in inner)]
+    )
     reach = points @ outward
     tip = points[reach >= reach.max() - FINGERTIP * np.ptp(whole @ outward)]
     centre, half = (tip.min(0) + tip.max(0)) / 2, np.ptp(tip, axis=0) / 2
@@ -188,7 +190,7 @@ def _against_palm(
     """Points of the only finger, in its frame, and points of the hand that they meet when it closes."""
     closed = body.posed({n: body.limits(n)[0 if gripper.closes_low(n) else 1] for n in gripper.joints})
     hand, palm = _palm_points(body, gripper)
-    own = body.points(finger)
+    own = body.shapes.points(finger)
     outer = own[np.argsort(-np.linalg.norm(own, axis=1))]
     starts = np.array([outer[0] * share for share in (0.95, 0.8, 0.65, 0.5)])
     there = _to_base(body, hand, palm, closed)
@@ -223,7 +225,7 @@ def finger_tips(body: RobotBody, gripper: Gripper) -> list[str]:
     for link in body.fingers(gripper):  # the first of each finger, then what hangs on it
         branch = body.branch(link, gripper)
         links[branch] = links.get(branch, 0) + 1
-        if body.has_shape(link):
+        if body.shapes.has_shape(link):
             tips[branch] = link
     if len(tips) > 2:
         most = sorted((links[branch] for branch in tips), reverse=True)[1]
@@ -232,7 +234,7 @@ def finger_tips(body: RobotBody, gripper: Gripper) -> list[str]:
     if len(found) > 2:
         data, hand = body.posed(_half_way(body, gripper)), body.frame(gripper.hand)[0]
         origin = body.pose(hand, data)[0]
-        ends = {tip: _to_base(body, tip, body.points(tip), data) - origin for tip in found}
+        ends = {tip: _to_base(body, tip, body.shapes.points(tip), data) - origin for tip in found}
         reach = {tip: float(np.linalg.norm(points, axis=1).max()) for tip, points in ends.items()}
         far = [tip for tip in found if reach[tip] >= FAR * max(reach.values())]
         found = far if len(far) >= 2 else found

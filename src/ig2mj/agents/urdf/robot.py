@@ -39,6 +39,7 @@ from ig2mj.agents.parts import (
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.agents.urdf.adding import add_robot
 from ig2mj.agents.urdf.assignment import find_layout, raised
+from ig2mj.agents.urdf.base_motion import glide
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.controller import UrdfController
 from ig2mj.agents.urdf.description import Description
@@ -240,7 +241,7 @@ class UrdfRobot(TaskRobot):
         body, found = self.body, []
         for gripper in self.layout.grippers:
             links = body.fingers(gripper)
-            found += [*links, *([body.frame(gripper.hand)[0]] if sum(map(body.has_shape, links)) == 1 else [])]
+            found += [*links, *([body.frame(gripper.hand)[0]] if sum(map(body.shapes.has_shape, links)) == 1 else [])]
         found += [body.frame(link)[0] for link in self.layout.suction]
         return list(dict.fromkeys(found))
 
@@ -254,7 +255,7 @@ class UrdfRobot(TaskRobot):
 
     def _add_pedestal(self, spec: mujoco.MjSpec, base: mujoco.MjsBody, standing: float, mount: float) -> None:
         """A box from the floor to the underside of a base that is bolted to it."""
-        centre, half = self.body.box(self.description.base)
+        centre, half = self.body.shapes.box(self.description.base)
         wide = float(np.clip(max(half[:2]), *PEDESTAL))
         size, pos = (wide, wide, mount / 2), (float(centre[0]), float(centre[1]), -standing - mount / 2)
         collision(base, GEOM.mjGEOM_BOX, size, 0.0, pos)
@@ -298,7 +299,7 @@ class UrdfRobot(TaskRobot):
         base, centre = spec.body(self.name), self.body.centre
         site = f"{self.name}/glide"
         base.add_site(name=site, pos=[0.0, 0.0, float(centre[2])], rgba=[0.0] * 4, size=[1e-3] * 3)
-        speed, turn, force = self.body.glide(self.layout)
+        speed, turn, force = glide(self.body, self.layout)
         for axis, name, inertia, most in (
             (0, "forward", self.body.mass, force),
             (1, "left", self.body.mass, force),

@@ -43,7 +43,7 @@ def wrist_views(body: RobotBody, layout: Layout, holding: Sequence[str], name: s
     points = {rays.palm: np.asarray(rays.grasp_point, float) for rays in hand_rays(name, body, layout)}
 
     def view(link: str) -> WristView:
-        centre, half = body.box(link)
+        centre, half = body.shapes.box(link)
         turn = body.pose(link, data)[1]
         grasp = points.get(name if link == body.base else f"{name}_{link}", centre + half)
         along = grasp - centre

@@ -8,7 +8,9 @@ from collections.abc import Sequence
 
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.steps import PRIMITIVES, Step, make_step
+from ig2mj.planning.words.instruction import Instruction
 from ig2mj.planning.words.nouns import Lexicon, NotUnderstoodError, Phrase, Reader, choose
+from ig2mj.planning.words.treatment import treatment
 from ig2mj.planning.words.verbs import (
     ADJECTIVES,
     CARRY,
@@ -36,42 +38,6 @@ PLACES = {
 
 _TOKEN = re.compile(r"[\w'-]+|[.,;:!?]")
 _ENDS = frozenset(".;:!?")
-
-
-@dataclasses.dataclass(frozen=True)
-class Instruction:
-    """What words ask for.
-
-    Attributes:
-      text: the words. steps: requests to primitives, in order. notes: a line for each choice among several objects.
-    """
-
-    text: str
-    steps: tuple[Step, ...]
-    notes: tuple[str, ...] = ()
-
-    @property
-    def goal(self) -> str | None:
-        """The expression that holds when all is done; None: a step has no lasting effect (`grasp`, `navigate_to`).
-
-        What a later step undoes is left out.
-        """
-        found: dict[tuple[str, tuple[str, ...]], Condition] = {}
-        for step in self.steps:
-            if not step.adds:
-                return None
-            for condition in step.adds:
-                key = (condition.predicate, condition.arguments)
-                found.pop(key, None)
-                found[key] = condition
-        words = [expression(c) for c in found.values()]
-        return words[0] if len(words) == 1 else f"(and {' '.join(words)})"
-
-
-def expression(condition: Condition) -> str:
-    """A condition in the form that `ig2mj.predicates.parse` reads."""
-    inner = f"({' '.join((condition.predicate, *condition.arguments))})"
-    return inner if condition.value else f"(not {inner})"
 
 
 def understand(text: str, facts: Facts) -> Instruction:
@@ -284,7 +250,7 @@ class _Clauses:
         reader.take("clean", "dry")
         said = self._with(kind)
         for name in names:
-            self.steps.append(self._treated(kind, name, said))
+            self.steps.append(treatment(self.lexicon.facts, kind, name, said))
 
     def _with(self, kind: str) -> str:
         """The tool or source that is named after an object; "": none."""
@@ -296,42 +262,6 @@ class _Clauses:
         if kind in ("cook", "freeze", "soak") and reader.take(*places):
             return self._names(self._objects("a place", single=True))[0]
         return ""
-
-    def _treated(self, kind: str, name: str, said: str) -> Step:
-        domain = self.domain
-        if kind in ("clean", "wipe"):
-            kind = self._cleaned(kind, name)
-        predicate = PRIMITIVES[kind].adds[0][-2]
-        wish = Condition(predicate, (name,), PRIMITIVES[kind].adds[0][0] != "not")
-        if reason := domain.impossible(wish):
-            raise NotUnderstoodError(f"cannot {kind} {name}: {reason}")
-        sources = {
-            "wipe": domain.tools,
-            "scrub": self._brushes(),
-            "slice": domain.knives,
-            "soak": domain.taps,
-            "cook": tuple(s.name for s in domain.heaters(name)) if kind == "cook" else (),
-            "freeze": tuple(s.name for s in domain.coolers(name)) if kind == "freeze" else (),
-        }[kind]
-        able = [s for s in sources if s != name]
-        if said and said not in able:
-            raise NotUnderstoodError(f"'{said}' cannot {kind} {name} (can: {', '.join(able) or 'nothing here'})")
-        if not able:
-            raise NotUnderstoodError(f"nothing here can {kind} {name}")
-        return make_step(kind, (name, said or able[0]))
-
-    def _cleaned(self, kind: str, name: str) -> str:
-        """The primitive that cleans an object: by what is on it now, else by what can be and by the verb."""
-        facts = self.lexicon.facts
-        now = {p: facts.holds(predicate, name) for p, predicate in (("scrub", "stained"), ("wipe", "dusty"))}
-        able = {"scrub": self.domain.has(name, "stainable"), "wipe": self.domain.has(name, "dustyable")}
-        order = ("wipe", "scrub") if kind == "wipe" else ("scrub", "wipe")
-        return next((p for p in order if now[p]), next((p for p in order if able[p]), order[0]))
-
-    def _brushes(self) -> tuple[str, ...]:
-        """Tools that scrub, brushes first."""
-        tools = [t for t in self.domain.tools if self.domain.has(t, "soakable")]
-        return tuple(sorted(tools, key=lambda t: "brush" not in t))
 
     def _move(self, kind: str) -> None:
         """An object, where it is taken from, and where it goes."""

@@ -1,0 +1,55 @@
+"""Which primitive and which tool treat an object that an instruction says to clean, cook or slice."""
+
+from __future__ import annotations
+
+from ig2mj.planning.domain import Domain
+from ig2mj.planning.facts import Facts
+from ig2mj.planning.steps import PRIMITIVES, Step, make_step
+from ig2mj.planning.words.nouns import NotUnderstoodError
+from ig2mj.sampling.conditions import Condition
+
+
+def treatment(facts: Facts, kind: str, name: str, tool: str) -> Step:
+    """The step that treats an object.
+
+    Args:
+      kind: a primitive, or "clean": the one that cleans what is on the object. tool: "": the first that can.
+
+    Raises:
+      NotUnderstoodError: the object cannot be treated so, or not with this tool, or nothing in the scene can do it.
+    """
+    domain = facts.domain
+    if kind in ("clean", "wipe"):
+        kind = _cleaning(facts, kind, name)
+    predicate = PRIMITIVES[kind].adds[0][-2]
+    wish = Condition(predicate, (name,), PRIMITIVES[kind].adds[0][0] != "not")
+    if reason := domain.impossible(wish):
+        raise NotUnderstoodError(f"cannot {kind} {name}: {reason}")
+    tools = {
+        "wipe": domain.tools,
+        "scrub": _brushes(domain),
+        "slice": domain.knives,
+        "soak": domain.taps,
+        "cook": tuple(s.name for s in domain.heaters(name)) if kind == "cook" else (),
+        "freeze": tuple(s.name for s in domain.coolers(name)) if kind == "freeze" else (),
+    }[kind]
+    able = [t for t in tools if t != name]
+    if tool and tool not in able:
+        raise NotUnderstoodError(f"'{tool}' cannot {kind} {name} (can: {', '.join(able) or 'nothing here'})")
+    if not able:
+        raise NotUnderstoodError(f"nothing here can {kind} {name}")
+    return make_step(kind, (name, tool or able[0]))
+
+
+def _cleaning(facts: Facts, kind: str, name: str) -> str:
+    """The primitive that cleans an object: by what is on it now, else by what can be and by the verb."""
+    now = {p: facts.holds(predicate, name) for p, predicate in (("scrub", "stained"), ("wipe", "dusty"))}
+    able = {"scrub": facts.domain.has(name, "stainable"), "wipe": facts.domain.has(name, "dustyable")}
+    order = ("wipe", "scrub") if kind == "wipe" else ("scrub", "wipe")
+    return next((p for p in order if now[p]), next((p for p in order if able[p]), order[0]))
+
+
+def _brushes(domain: Domain) -> tuple[str, ...]:
+    """Tools that scrub, brushes first."""
+    tools = [t for t in domain.tools if domain.has(t, "soakable")]
+    return tuple(sorted(tools, key=lambda t: "brush" not in t))
