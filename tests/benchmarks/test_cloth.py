@@ -9,8 +9,8 @@ import pytest
 import warp as wp
 from scipy import optimize
 
+from benchmarks.harness.cloth_solver import CONTROL_STEP, GRAVITY, Sheets, box, make_cloth, sphere
 from benchmarks.speed import cloth
-from benchmarks.speed.cloth import CONTROL_STEP, GRAVITY, Sheets, box, make_cloth, sphere
 
 
 def settle(sheets: Sheets, seconds: float) -> None:
