@@ -11,6 +11,7 @@ import jax
 import mujoco
 import numpy as np
 import pytest
+import warp as wp
 from bench_scene import TOP
 
 from ig2mj.engine.native.engine import NativeEngine
@@ -161,6 +162,22 @@ def shoot(engine, model, physics):
     call = jax.jit(camera.__call__)
     view = engine.view(physics)
     return lambda states, now=physics: jax.tree.map(np.asarray, call(now, view, states))
+
+
+def test_constants_of_programs_hold_no_unwritten_memory(engine, model, monkeypatch):
+    """Another number in each process would give another program, which no cache has."""
+    empty = wp.empty
+
+    def marked(*arguments, **named):
+        made = empty(*arguments, **named)
+        if made.size and made.dtype in (wp.int32, wp.float32):
+            made.fill_(12345)
+        return made
+
+    monkeypatch.setattr(wp, "empty", marked)
+    camera = BatchCamera(engine, model, ["front"], width=8, height=8, particles=0)
+    for path, leaf in jax.tree_util.tree_leaves_with_path((camera._template, camera._model)):
+        assert not (np.asarray(leaf) == 12345).any(), jax.tree_util.keystr(path)
 
 
 @pytest.mark.slow

@@ -27,6 +27,7 @@ from ig2mj.engine.base import Engine
 from ig2mj.engine.mjx.physics import MjxPhysics, own_device
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.engine.warp.patches import graphs_kept, pins
+from ig2mj.engine.warp.unwritten import unwritten_is_zero
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.looks.costume import Followers
@@ -134,7 +135,8 @@ class BatchCamera:
         self._merged = self._merge(groups) if merge_meshes and mergeable(host) and not pins.obstacles() else None
         data = mujoco.MjData(host)
         mujoco.mj_forward(host, data)
-        self._template = mjx.put_data(host, data, own_device(), impl="warp", naconmax=1, naccdmax=1, njmax=1)
+        with unwritten_is_zero():
+            self._template = mjx.put_data(host, data, own_device(), impl="warp", naconmax=1, naccdmax=1, njmax=1)
         self._settings: dict[str, Any] = dict(
             nworld=engine.num_worlds,
             cam_res=[(width, self._lines)] * len(cameras) + [(len(s.rays), 1) for s in self._sectors],

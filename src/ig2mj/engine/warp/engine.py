@@ -33,8 +33,8 @@ from ig2mj.engine.warp import kernels, patches
 from ig2mj.engine.warp.ignored_contacts import DROP, encode, filter_contacts
 from ig2mj.engine.warp.patches import scratch, table
 from ig2mj.engine.warp.patches.flags import REPLACED
-from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
+from ig2mj.engine.warp.unwritten import unwritten_is_zero
 from ig2mj.process import entry_point, prepare_warp
 from ig2mj.process.gc_pause import Traced
 from ig2mj.scene.scene import Scene
@@ -199,7 +199,7 @@ class WarpEngine(MjxEngine):
 
     def _put_data(self, model: mujoco.MjModel, data: mujoco.MjData) -> mjx.Data:
         worlds, profile = self._worlds_of_buffers, self.profile
-        with _ZEROED.entered(), patches.counted_quickly(self.own_kernels):
+        with unwritten_is_zero(), patches.counted_quickly(self.own_kernels):
             return mjx.put_data(
                 model,
                 data,
@@ -233,12 +233,6 @@ class WarpEngine(MjxEngine):
 
     def _overflow(self, data: mjx.Data) -> Int[Array, "W"]:
         return data._impl.overflow
-
-
-_ZEROED = ScopedReplacement()
-"""Data starts as zeros where MuJoCo Warp leaves memory uninitialised. Programs that hold data as constants would
-contain other numbers each time, and no cache of programs would recognise them."""
-_ZEROED.add({(wp, "empty"): wp.zeros})
 
 
 @functools.cache
