@@ -34,6 +34,8 @@ from ig2mj.learn.ppo import PPO, PPOConfig
 from ig2mj.learn.sac import SAC, SACConfig
 from ig2mj.learn.settings import configure_all, configured, written
 from ig2mj.learn.train import Run, train
+from ig2mj.process.compilation import XLA_EVENT
+from ig2mj.process.gc_pause import Compiled
 
 CONFIG = PPOConfig(rollout_length=4, minibatches=1, epochs=1, actor_layers=(16,), critic_layers=(16,))
 
@@ -286,3 +288,25 @@ def test_a_checkpoint_of_version_0_1_is_refused_with_the_version_that_reads_it(d
         file.write_text(json.dumps(meta))
     with pytest.raises(InputError, match=r"ig2mj 0\.1\.0"):
         train(env, algorithm(env), Run(iterations=30, out=tmp_path / "old", resume=True, quiet=True))
+
+
+def test_an_iteration_is_compiled_together_with_the_start_where_kernels_are_awaited(monkeypatch):
+    class Awaiting(PointMass):
+        """Offers its start's program, as an environment does whose engine is loading kernels."""
+
+        def pending_programs(self, seed):
+            return [Compiled(self._start_fn).traced(jax.random.PRNGKey(seed))]
+
+    compiled = list[str]()
+
+    def note(event: str, duration_secs: float, **about: str | int) -> None:
+        if event == XLA_EVENT:
+            compiled.append(str(about.get("fun_name")))
+
+    env, once = Awaiting(8), []
+    reset = env.reset
+    monkeypatch.setattr(env, "reset", lambda seed: (once.append(list(compiled)), reset(seed))[1])
+    jax.monitoring.register_event_duration_secs_listener(note)
+    result = train(env, algorithm(env), Run(iterations=2, quiet=True))
+    assert "jit(whole)" in once[0] and compiled.count("jit(whole)") == 1, "the call finds what was compiled"
+    assert result.compile_s > 0

@@ -228,7 +228,7 @@ class Engine(Protocol):
 
     def pending_reset_program(self) -> Traced | None:
         """The traced program of `reset` while kernels are still being compiled or loaded in the background, so that
-        the caller can compile programs meanwhile; else None."""
+        the caller can compile programs meanwhile; else None. It is given once."""
         ...
 
     # Physics.

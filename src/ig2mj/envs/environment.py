@@ -41,7 +41,7 @@ from ig2mj.envs.state import EnvState, Seen, StepContext
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process import entry_point
-from ig2mj.process.gc_pause import GC_PAUSED, compile_together
+from ig2mj.process.gc_pause import GC_PAUSED, Traced, compile_together
 from ig2mj.scene.scene import Scene
 from ig2mj.tasks.actions import ActionMap
 from ig2mj.tasks.custom.objective import CustomObjective
@@ -229,11 +229,19 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
             return self._reset(seed, checked_mask(mask, self.num_worlds))
         if mask is not None:
             raise EngineError("a mask resets worlds of a state: reset(state, mask); a seed starts all of them")
-        number = as_seed(seed, self.num_worlds)
-        if (physics := self.core.engine.pending_reset_program()) is not None:
-            compile_together([self._start.traced(physics.returned, number), physics])
+        compile_together(self.pending_programs(seed))
         with GC_PAUSED:
-            return self._start(self.core.engine.reset(), number)
+            return self._start(self.core.engine.reset(), as_seed(seed, self.num_worlds))
+
+    def pending_programs(self, seed: Seed = 0) -> list[Traced]:
+        """The programs of `reset(seed)`, traced and not compiled, while the engine's kernels are being loaded; empty:
+        nothing is gained by compiling them beforehand. The first one returns the state, so that a program which steps
+        it can be traced, too, and all of them compiled together (`ig2mj.process.gc_pause.compile_together`).
+        """
+        physics = self.core.engine.pending_reset_program()
+        return (
+            [] if physics is None else [self._start.traced(physics.returned, as_seed(seed, self.num_worlds)), physics]
+        )
 
     def _start_fn(self, physics: Physics, seed: Seeds) -> EnvState:
         batch = self.core.start_fn(physics, seed)

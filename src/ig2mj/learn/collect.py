@@ -116,8 +116,12 @@ of the success that is reported."""
 
 def begin(env: TrainingEnv, acting: Any, seed: int) -> Play:
     """All worlds at the start of an episode."""
-    state = env.reset(seed)
-    zero = np.zeros(env.num_worlds)
+    return started(env.reset(seed), acting, env.num_worlds)
+
+
+def started(state: Any, acting: Any, num_worlds: int) -> Play:
+    """Where all worlds stand that are in this state, at the start of an episode. `state`: or its shapes."""
+    zero = np.zeros(num_worlds)
     return Play(_kept(state), acting, jnp.asarray(zero, jnp.float32), jnp.asarray(zero, jnp.int32))
 
 

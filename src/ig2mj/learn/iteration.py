@@ -27,10 +27,11 @@ from ig2mj.cluster.team import Team
 from ig2mj.engine.view import Array
 from ig2mj.envs.experts import expert_of
 from ig2mj.errors import EngineError
-from ig2mj.learn.collect import NativeCollector, Play, TrainingEnv, begin, collect_fn
+from ig2mj.learn.collect import NativeCollector, Play, TrainingEnv, begin, collect_fn, started
 from ig2mj.learn.nonempty_leaves import nonempty, nonempty_specs, restored, shards_of
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.protocols import as_adviser
+from ig2mj.process.gc_pause import Compiled, compile_together
 
 AXIS = "devices"
 """The axis of devices, over which algorithms average gradients."""
@@ -78,7 +79,7 @@ class OneDevice:
         seconds) and `learn` (learner, buffer, rollout, key, progress, ready -> learner, buffer, losses).
         """
         self._env, self._algorithm, self.num_worlds = env, algorithm, env.num_worlds
-        self._whole = None
+        self._whole: Compiled | None = None
         if env.pure and programs == 1:
 
             def whole(learner: Any, buffer: Any, play: Play, key: Array, progress: Array, ready: Array) -> Any:
@@ -96,7 +97,7 @@ class OneDevice:
                 learner, buffer, losses = algorithm.learn(learner, buffer, rollout, learn_key, progress, ready)
                 return learner, buffer, play, sums, {**losses, "all_finite": finite(learner)}
 
-            self._whole = jax.jit(whole, donate_argnums=(0, 1, 2))
+            self._whole = Compiled(whole, donate_argnums=(0, 1, 2))
             return
 
         def learn(learner: Any, buffer: Any, rollout: Any, key: Array, progress: Array, ready: Array) -> Any:
@@ -129,6 +130,16 @@ class OneDevice:
     def begin(self, seed: int) -> Any:
         """All worlds at the start of an episode."""
         return begin(self._env, self._algorithm.acting_state(self.num_worlds), seed)
+
+    def compile_beforehand(self, learner: Any, buffer: Any, key: Array, seed: int) -> None:
+        """Compiles the iteration together with what `begin(seed)` runs, while the engine's kernels are being loaded."""
+        pending = getattr(self._env, "pending_programs", None)
+        programs = pending(seed) if pending is not None else []
+        if programs and self._whole is not None:
+            acting = self._algorithm.acting_state(self.num_worlds)
+            play = started(programs[0].returned, acting, self.num_worlds)
+            whole = self._whole.traced(learner, buffer, play, key, jnp.float32(0.0), jnp.bool_(False))
+            compile_together([whole, *programs])
 
     def place(self, learner: Any, buffer: Any) -> tuple[Any, Any]:
         """Where an iteration wants them."""

@@ -3,9 +3,9 @@
 On a pure engine an iteration (a rollout, and all updates on it) is one compiled program, or two where that is asked
 for. On the native engine the same loop calls the compiled policy, the environment and the compiled learner in turn.
 
-The clock of a run is wall time without the first iteration, which is stated as `compile_s`; a resumed run goes on with
-the clock of its checkpoint. The first iterations only play (`warm_up`): what they take is the simulator's share later
-on, since inside one program the two cannot be separated; with two programs both are measured.
+The clock of a run is wall time without compilation and the first iteration, which are stated as `compile_s`; a resumed
+run goes on with the clock of its checkpoint. The first iterations only play (`warm_up`): what they take is the
+simulator's share later on, since inside one program the two cannot be separated; with two programs both are measured.
 """
 
 from __future__ import annotations
@@ -182,6 +182,10 @@ class _Training:
         """Iterations until the run is over; see `train`."""
         run, team, worlds = self.run, self.team, self.step.num_worlds
         self.learner, self.buffer = self.step.place(same(self.learner, team), self.buffer)
+        beforehand = time.monotonic()
+        if isinstance(self.step, OneDevice):
+            self.step.compile_beforehand(self.learner, self.buffer, self.key, run.seed + self.iteration)
+        beforehand = time.monotonic() - beforehand
         with team.turns():
             play = self.step.begin(run.seed + self.iteration)  # a resumed run has other starts
         zero = logged = time.monotonic()  # `zero`: when the clock was 0
@@ -196,7 +200,7 @@ class _Training:
             took = now - began
             if done == 0:
                 compiled()
-                compile_s, logged = took, time.monotonic()
+                compile_s, logged = beforehand + took, time.monotonic()
                 window.began, zero = logged, logged - self.clock
             else:
                 self.clock = time.monotonic() - zero

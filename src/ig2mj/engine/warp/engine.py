@@ -130,10 +130,11 @@ class WarpEngine(MjxEngine):
         """See `Engine.pending_reset_program`."""
         if self.loading is None or self._has_begun:
             return None
+        self._has_begun = True
         return self._first.traced(self._template, self._initial)
 
     def reset(self) -> MjxPhysics:
-        """All worlds at the initial state, when the kernels are there that steps from it need.
+        """All worlds at the initial state, as soon as the kernels are there that steps from it need.
 
         Raises:
           EngineError: a kernel could not be compiled or loaded.
