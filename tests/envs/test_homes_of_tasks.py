@@ -21,6 +21,7 @@ from ig2mj.tasks.bddl.task import bddl_task
 from ig2mj.tasks.experts.quarters import quarter_turn, turned_view
 from ig2mj.tasks.homes import check_inside, in_home
 from ig2mj.tasks.registry import load_task
+from ig2mj.tasks.relocation import reason_against
 
 COOKING = ACTIVITIES["CookingMeat"]
 
@@ -54,12 +55,43 @@ def test_what_bddl_defines_is_bound_again():
 
 
 def test_an_activity_without_a_fit_needs_its_furniture_where_it_is():
-    bound = dataclasses.replace(COOKING, fit=None)
+    without_fit = dataclasses.replace(COOKING, fit=None)
     assert in_home(COOKING, COOKING.home) == COOKING
     with pytest.raises(EngineError, match=r"'small_home': it has no bottom_cabinet_1"):
-        in_home(bound, "small_home")
+        in_home(without_fit, "small_home")
     with pytest.raises(EngineError, match=r"is \d+\.\d m from its position in 'birch'"):
-        in_home(bound, "elm")
+        in_home(without_fit, "elm")
+
+
+def test_objects_at_fixed_places_need_there_what_is_next_to_them_at_home():
+    """The board of CleaningStainedShelf hangs on a wall of birch."""
+    shelf = ACTIVITIES["CleaningStainedShelf"]
+    assert not reason_against(shelf, shelf.home)
+    with pytest.raises(EngineError, match="'small_home': the activity has walls at -y next to 'shelf/shelf_14@") as e:
+        in_home(shelf, "small_home")
+    assert reason_against(shelf, "small_home") == str(e.value)
+
+
+def bound(home, **fields):
+    """An activity of a home, without `Task.fit`, that names none of its furniture."""
+    empty = {"fit": None, "objects": (), "start": (), "near": (), "objects_of_interest": (), "robots": {}}
+    return dataclasses.replace(COOKING, home=str(home), **{**empty, **fields})
+
+
+def test_robots_need_free_floor_where_they_start(tiny_home_folder):
+    robots = {"fetch": dataclasses.replace(COOKING.robots["fetch"], pos=(1.0, 1.0, 0.0))}
+    assert in_home(bound(tiny_home_folder, robots=robots), "small_home").home == "small_home"
+    robots = {"fetch": dataclasses.replace(COOKING.robots["fetch"], pos=(1.0, -1.5, 0.0))}
+    with pytest.raises(EngineError, match="robot 'fetch' stands on free floor in 'tiny_home', and there is none here"):
+        in_home(bound(tiny_home_folder, robots=robots), "small_home")
+
+
+def test_objects_of_an_activity_are_named_as_in_the_home_where_it_is(tiny_home_folder):
+    """The small home has a chopping board of its own."""
+    start = ("(dusty chopping_board_0)",)
+    moved = in_home(bound(tiny_home_folder, objects=("chopping_board",), start=start), "small_home")
+    assert moved.start == ("(dusty chopping_board_1)",)
+    assert moved.roles == {"chopping_board_0": "chopping_board_1"}
 
 
 def test_an_activity_goes_where_another_home_has_its_furniture():

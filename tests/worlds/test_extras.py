@@ -7,7 +7,7 @@ import pytest
 
 import ig2mj
 from ig2mj.engine.writes import teleports
-from ig2mj.errors import Ig2mjError, StateError, UnknownNameError
+from ig2mj.errors import AbilityError, Ig2mjError, StateError, UnknownNameError
 from ig2mj.scene import manifest as mf
 from ig2mj.simulation import Simulation
 
@@ -115,6 +115,15 @@ def test_fire_spreads_to_what_is_near_and_burns_out(simulation):
     for _ in range(3300):
         simulation.step()
     assert not simulation.predicate("on_fire", "paper") and _celsius(simulation, "paper") < 1000
+
+
+def test_what_cannot_break_or_burn_is_not_set_so(simulation):
+    with pytest.raises(AbilityError, match="'broken' of 'board': its category 'shelf' is not breakable"):
+        simulation.set_predicate("broken", "board")
+    with pytest.raises(AbilityError, match="'on_fire' of 'glass': its category 'glass' is not flammable"):
+        simulation.set_state("on_fire", "glass", True)
+    assert simulation.set_predicate("broken", "board", value=False) and simulation.set_predicate("broken", "glass")
+    assert simulation.predicate("broken", "glass") and not simulation.predicate("broken", "board")
 
 
 def test_scenes_that_ask_for_nothing_have_none_of_it(folder):

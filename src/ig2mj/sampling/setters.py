@@ -24,7 +24,7 @@ from ig2mj.predicates.substances import substance_index
 from ig2mj.sampling.substance_setters import SUBSTANCE_SETTERS
 from ig2mj.sampling.surface_particles import sample_places
 from ig2mj.states import particles, registry
-from ig2mj.states.definitions import max_temperature, sliced, temperature, toggled_on, wetness
+from ig2mj.states.definitions import broken, max_temperature, on_fire, sliced, temperature, toggled_on, wetness
 from ig2mj.states.definitions.dirt import Dirt
 from ig2mj.states.definitions.dust import DUST
 from ig2mj.states.definitions.open import sample_open
@@ -221,11 +221,13 @@ def _sliced(t: _Task, value: bool) -> Change:
     return Change(*sliced.set_sliced(t.model, t.states, only, t.view))
 
 
-def _extra(name: str) -> Callable[[_Task, bool], Change]:
+def _extra(name: str, ability: str, able: Callable[[StateModel], Bool[np.ndarray, "O"]]) -> Callable[..., Change]:
     def setter(t: _Task, value: bool) -> Change:
         if name not in t.model.extras:
             fix = f"load it with objects=['with:{name}'], or --object with:{name}"
             raise StateError(f"the scene has no state '{name}': {fix}")
+        if value and not able(t.model)[t.objects[0]]:
+            raise AbilityError(lacks(f"predicate '{name}'", t.object_name, t.model, (ability,)))
         write = registry.STATES[name].set
         assert write is not None
         return Change(dataclasses.replace(t.states, **write(t.states, t.mask, value)))
@@ -276,8 +278,8 @@ _SETTERS: dict[str, Callable[[_Task, bool], Change]] = {
     "open": _open,
     "sliced": _sliced,
     "real": _real,
-    "on_fire": _extra("on_fire"),
-    "broken": _extra("broken"),
+    "on_fire": _extra("on_fire", "flammable", on_fire.flammable),
+    "broken": _extra("broken", "breakable", broken.of_breakable_category),
     "dusty": _dirty(DUST),
     "stained": _dirty(STAIN),
 }

@@ -8,26 +8,21 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import pathlib
 
 import numpy as np
 
 from ig2mj.errors import EngineError
-from ig2mj.sampling.conditions import read_conditions
 from ig2mj.scene.manifest import load_manifest
-from ig2mj.scene.paths import SHIPPED_HOMES, scene_folder
-from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.scene.paths import scene_folder
+from ig2mj.scene.scene import Scene
 from ig2mj.tasks.bddl.binding import bind
 from ig2mj.tasks.bddl.task import BddlTask
 from ig2mj.tasks.navigation.task import NavigationTask
-from ig2mj.tasks.relocation import relocated
+from ig2mj.tasks.relocation import home_name, relocated
 from ig2mj.tasks.task import Task
 
 DOORWAY = 0.3
 """m around a robot in which there must be a room: between two rooms the map has none."""
-
-ELSEWHERE = 0.3
-"""m by which furniture may stand elsewhere than in an activity's own home: hands still reach it."""
 
 AnyTask = Task | NavigationTask | BddlTask
 
@@ -35,56 +30,19 @@ AnyTask = Task | NavigationTask | BddlTask
 def in_home(task: AnyTask, home: str | os.PathLike) -> AnyTask:
     """The task in another home: a folder of a converted scene, or the name of a home that ships.
 
-    Navigation goes into any home with a map of its floor. What BDDL defines is bound to the home's objects again. An
-    activity of the paper goes where it finds the furniture that it needs (`ig2mj.tasks.relocation`); one without
-    `Task.fit` needs the furniture that it names at the places of its own home.
+    Navigation goes into any home with a map of its floor. What BDDL defines is bound to the home's objects again.
+    Activities of the paper: `ig2mj.tasks.relocation.relocated`.
 
     Raises:
       InputError: there is no such home. BindingError: it lacks what the activity needs. EngineError: the activity's
         furniture is not there, or elsewhere.
     """
-    folder, name = scene_folder(home), os.fspath(home)
-    if folder.parent != SHIPPED_HOMES:
-        name = str(folder.resolve())
     if isinstance(task, BddlTask):
-        binding = bind(task.binding.activity, load_manifest(folder))
-        return dataclasses.replace(task, binding=dataclasses.replace(binding, home=name))
-    if isinstance(task, Task) and scene_folder(task.home) != folder:
-        if task.fit is not None and not _has_furniture(task, folder):
-            return relocated(task, home)
-        _check_furniture(task, folder)
-    return dataclasses.replace(task, home=name)
-
-
-def _has_furniture(task: Task, folder: pathlib.Path) -> bool:
-    """What the task names of its home is there, where it is at home."""
-    try:
-        _check_furniture(task, folder)
-    except EngineError:
-        return False
-    return True
-
-
-def _check_furniture(task: Task, folder: pathlib.Path) -> None:
-    """Raises EngineError where what the task names of its home is not there, or elsewhere."""
-    own, other = load_scene(task.home), load_scene(folder)
-    arguments = [a for condition in read_conditions(task.start) for a in condition.arguments]
-    named = [name for name in dict.fromkeys([*arguments, *task.objects_of_interest]) if name in own.object_names]
-    missing = [name for name in named if name not in other.object_names]
-    hint = 'ig2mj.make("activity/...", home=...) goes into any home that has what it needs'
-    if missing:
-        raise EngineError(f"{task.name} cannot be done in '{other.name}': it has no {', '.join(missing)} ({hint})")
-    if all(acts.pos is None for acts in task.robots.values()) and not task.near:
-        return  # it goes wherever its furniture stands
-    both = [(scene, scene.start_data()) for scene in (own, other)]
-    for name in named:
-        here, there = (data.xpos[scene.tables.object_root[scene.object_index(name)]] for scene, data in both)
-        apart = float(np.linalg.norm(here - there))
-        if apart > ELSEWHERE:
-            raise EngineError(
-                f"{task.name} cannot be done in '{other.name}': its {name} is {apart:.1f} m from its position in "
-                f"'{own.name}', which the activity needs ({hint})"
-            )
+        binding = bind(task.binding.activity, load_manifest(scene_folder(home)))
+        return dataclasses.replace(task, binding=dataclasses.replace(binding, home=home_name(home)))
+    if isinstance(task, Task):
+        return relocated(task, home)
+    return dataclasses.replace(task, home=home_name(home))
 
 
 def check_inside(task: str, scene: Scene) -> None:

@@ -7,6 +7,9 @@ stands on free floor in front of it, facing it as it does at home, and what it n
 Of all places that will do, the one that is most like the own home's is taken. Everything follows from the home's
 geometry at its start, so that the same home always gives the same task.
 
+An activity without `Task.fit` goes only where everything is as in its own home: the furniture that it names is at the
+same places, and so is what is next to objects that the activity puts at fixed places.
+
 Homes are turned by quarters against each other (`Task.turned`): experts see the world as it is at home.
 
 Axis: N points.
@@ -29,8 +32,10 @@ from jaxtyping import Bool, Float
 
 from ig2mj.errors import EngineError
 from ig2mj.geometry.poses import quat_rotate
+from ig2mj.sampling.conditions import read_conditions
 from ig2mj.scene.additions import name_additions
 from ig2mj.scene.library import LibraryName
+from ig2mj.scene.object_requests import read_request
 from ig2mj.scene.paths import SHIPPED_HOMES, scene_folder
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.scene.tables import LinkKind
@@ -59,6 +64,14 @@ AHEAD, ASIDE = (0.28, 0.95), 0.55
 
 ENOUGH = 24
 """Points of a surface in reach: 0.06 m2. With fewer, hardly any sampled state would count."""
+
+ELSEWHERE = 0.3
+"""m by which furniture may stand elsewhere than in an activity's own home: hands still reach it."""
+
+CLOSE = 0.02
+"""m from an object within which it is next to another: the wall that a board is fixed to, the floor of a table."""
+
+ELSE = 'ig2mj.make("activity/...", home=...) goes into any home that has what it needs'
 
 SITS = 0.05
 """m: fixed things no higher than this, such as carpets, are stood on."""
@@ -108,6 +121,20 @@ class Household:
         own = self.owner == self.scene.object_index(name)
         return self.low[own].min(0), self.high[own].max(0)
 
+    def next_to(self, name: str) -> str:
+        """Categories of fixed objects whose boxes are within `CLOSE` of an object's, and on which side of it."""
+        low, high = self.box(name)
+        below, above = low - self.high, self.low - high
+        apart = np.maximum(below, above)
+        close = (self.owner >= 0) & (np.linalg.norm(np.maximum(0.0, apart), axis=1) < CLOSE)
+        close &= self.fixed[self.owner] & (self.owner != self.scene.object_index(name))
+        found = set[str]()
+        for geom in np.flatnonzero(close):
+            axis = int(np.argmax(apart[geom]))
+            side = "+" if above[geom, axis] > below[geom, axis] else "-"
+            found.add(f"{self.categories[self.owner[geom]]} at {side}{'xyz'[axis]}")
+        return " and ".join(sorted(found)) or "nothing"
+
     def link(self, name: str, kind: LinkKind) -> Float[np.ndarray, "3"] | None:
         """Where an object's first annotated link of a kind is; None: it has none."""
         tables = self.scene.tables
@@ -153,23 +180,73 @@ def axes_of(quarter: int) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"
 def relocated(task: Task, home: str | os.PathLike) -> Task:
     """The task in another home. Raises EngineError: it does not fit; says why. InputError: there is no such home."""
     folder = scene_folder(home)
-    if task.fit is None:
-        raise EngineError(f"{task.name} cannot be done in '{folder.name}': only in homes with the furniture of its own")
-    return _moved(task, _name_of(home, folder), _spot(task.name, task.fit, _own(task), str(folder)))
+    if scene_folder(task.home) != folder:
+        reason = _difference(task, folder)
+        if reason and task.fit is not None:
+            return _moved(task, home_name(home), _spot(task.name, task.fit, _own(task), str(folder)))
+        if reason:
+            raise EngineError(f"{task.name} cannot be done in '{folder.name}': {reason} ({ELSE})")
+        if task.fit is None and (names := _names_of_added(task, folder)):
+            return with_names(dataclasses.replace(task, home=home_name(home), roles=names), names)
+    return dataclasses.replace(task, home=home_name(home))
 
 
 def reason_against(task: Task, home: str | os.PathLike) -> str:
     """Why a task cannot be done in a home; "" if it can."""
     try:
-        if scene_folder(task.home) != scene_folder(home):
-            relocated(task, home)
+        relocated(task, home)
     except EngineError as e:
         return str(e)
     return ""
 
 
-def _name_of(home: str | os.PathLike, folder: pathlib.Path) -> str:
+def home_name(home: str | os.PathLike) -> str:
+    """As tasks name a home: the name of one that ships, or the whole path of a folder."""
+    folder = scene_folder(home)
     return os.fspath(home) if folder.parent == SHIPPED_HOMES else str(folder.resolve())
+
+
+def _difference(task: Task, folder: pathlib.Path) -> str:
+    """What a home has not, or has elsewhere, of what the task needs of its own home; "": nothing."""
+    own, other = load_scene(task.home), load_scene(folder)
+    arguments = [a for condition in read_conditions(task.start) for a in condition.arguments]
+    named = [name for name in dict.fromkeys([*arguments, *task.objects_of_interest]) if name in own.object_names]
+    missing = [name for name in named if name not in other.object_names]
+    if missing:
+        return f"it has no {', '.join(missing)}"
+    if any(acts.pos is not None for acts in task.robots.values()) or task.near:  # else it goes where its furniture is
+        both = [(scene, scene.start_data()) for scene in (own, other)]
+        for name in named:
+            here, there = (data.xpos[scene.tables.object_root[scene.object_index(name)]] for scene, data in both)
+            if (apart := float(np.linalg.norm(here - there))) > ELSEWHERE:
+                where = f"{apart:.1f} m from its position in '{own.name}'"
+                return f"its {name} is {where}, which the activity needs"
+    placed = [request for request in task.objects if read_request(request).place is not None]
+    return _difference_around(task, own, other, placed) if placed or not named else ""
+
+
+def _difference_around(task: Task, own: Scene, other: Scene, placed: list[str]) -> str:
+    """How what is next to objects that are put at fixed places, and to robots, differs between two homes."""
+    around, free = list[list[str]](), list[list[bool]]()
+    robots = {name: acts.pos[:2] for name, acts in task.robots.items() if acts.pos is not None}
+    for scene in (own, other):
+        household = Household(load_scene(scene.folder, objects=placed))
+        around.append([household.next_to(name) for name, _ in name_additions(scene.object_names, placed)])
+        free.append([bool(household.free(np.array([pos]), 0.0)[0]) for pos in robots.values()])
+    for request, here, there in zip(placed, *around, strict=True):
+        if here != there:
+            has = f"the activity has {here} next to '{request}' in '{own.name}'"
+            return f"{has}, and here there is {there}"
+    for robot, here, there in zip(robots, *free, strict=True):
+        if here and not there:
+            return f"robot '{robot}' stands on free floor in '{own.name}', and there is none here"
+    return ""
+
+
+def _names_of_added(task: Task, folder: pathlib.Path) -> dict[str, str]:
+    """What objects that the task adds are called in a home, where that differs from its own home."""
+    own, other = (name_additions(load_scene(f).object_names, task.objects) for f in (task.home, folder))
+    return {here: there for (here, _), (there, _) in zip(own, other, strict=True) if here != there}
 
 
 def _own(task: Task) -> tuple[float, float, float]:

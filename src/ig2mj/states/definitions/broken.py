@@ -32,10 +32,15 @@ GRAVITY = np.array([0.0, 0.0, -9.81], np.float32)
 
 
 def breakable(model: StateModel) -> Bool[np.ndarray, "O"]:
-    """Loose objects whose category can break, by the taxonomy."""
-    tables = model.tables
-    known = {category: _can_break(category) for category in set(tables.object_categories)}
-    return np.array([known[c] for c in tables.object_categories], bool) & ~tables.object_fixed
+    """Objects that a blow can break: loose, and of a category that can break."""
+    return of_breakable_category(model) & ~model.tables.object_fixed
+
+
+def of_breakable_category(model: StateModel) -> Bool[np.ndarray, "O"]:
+    """Objects whose category can break, by the taxonomy."""
+    categories = model.tables.object_categories
+    known = {category: _can_break(category) for category in set(categories)}
+    return np.array([known[c] for c in categories], bool)
 
 
 def _can_break(category: str) -> bool:
