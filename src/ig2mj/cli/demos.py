@@ -53,7 +53,8 @@ def collect(
       disturbed: probability per step that five random steps begin, from which the expert recovers.
       seed: random seed of start states and noise.
       split: which start states: train or held_out.
-      pool_size: number of start states; 0: all of the split.
+      pool_size: number of start states; 0: all of the split, or as many as episodes where they neither ship nor were
+        sampled before.
       object: {object}.
       jobs: number of processes, each with its own worlds.
       cluster: run on a Ray cluster: its address, or auto.
@@ -61,6 +62,7 @@ def collect(
     """
     from ig2mj.cli.common.files import check_output
     from ig2mj.cli.common.objects import note_changes
+    from ig2mj.cli.common.tasks import few_rows
     from ig2mj.cluster.job_runner import map_jobs
     from ig2mj.cluster.jobs import JobSet
     from ig2mj.demos.collection import collection_jobs, join_recordings
@@ -83,6 +85,7 @@ def collect(
     check_output(out)
     robot = choose_robot(robot, own)
     where = where_of(jobs, cluster, resume)
+    pool_size = pool_size or few_rows(env, split, max(episodes, worlds), object, grasping)
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
     settings = {
         "env": env,

@@ -61,7 +61,8 @@ def run(
       robot: refuse a policy of another robot (the policy's card says which it is for); for a policy of a robot of your
         own, the folder that `ig2mj convert robot` wrote.
       grasping: refuse a policy of another grasping mode.
-      pool_size: number of start states; 0: all of the split.
+      pool_size: number of start states; 0: all of the split, or as many as episodes where they neither ship nor were
+        sampled before.
       object: {object}; default: those that it was trained with.
       stochastic: sample actions from the policy's distribution, as in training, instead of taking its mode.
       jobs: number of processes, each with its own worlds (the native engine uses all processors in any case).
@@ -89,6 +90,7 @@ def run(
     import jax
 
     from ig2mj.cli.common.files import check_output
+    from ig2mj.cli.common.tasks import few_rows
     from ig2mj.cluster.job_runner import map_jobs
     from ig2mj.cluster.jobs import JobSet
     from ig2mj.envs.shared_starts import shared_pool, shipped_states
@@ -132,22 +134,24 @@ def run(
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
     count = worlds or min(episodes, WORLDS.get(engine, PURE_WORLDS))
+    objects = object or objects_of(loaded, file)
+    mode = grasping or depends["grasping"]
+    rows = pool_size or few_rows(depends["task"], split, min(episodes, COUNT.get(split, episodes)), objects, mode)
     settings = {
         "file": str(file),
         "task": depends["task"],
         "robot": choose_robot(robot, own) or robot_of(loaded.card),
-        "grasping": grasping or depends["grasping"],
+        "grasping": mode,
         "engine": engine,
         "worlds": count,
         "observations": list(loaded.observations),
         "paper_rl": loaded.card.get("paper_rl", False),
         "split": split,
-        "pool_size": pool_size or None,
+        "pool_size": rows or None,
         "drawn": stochastic,
     }
     if loaded.card["depends"].get("looks"):
         settings["looks"] = looks_of(loaded)
-    objects = object or objects_of(loaded, file)
     if objects:
         settings["objects"] = list(objects)
     states = pool_size or COUNT.get(split, episodes)
@@ -155,7 +159,7 @@ def run(
         words = f"--episodes {episodes}: there are {states} start states, so some are played and counted again"
         print(f"warning: {words}", file=sys.stderr)
     where, title = where_of(jobs, cluster, resume), f"evaluating {target}"
-    starts = {"task": depends["task"], "split": split, "count": pool_size or None}
+    starts = {"task": depends["task"], "split": split, "count": rows or None}
     starts |= {"objects": list(objects)} if objects else {}
     shared = {"policy": file.read_bytes(), **(shared_pool(**starts) if cluster is not None or jobs != 1 else {})}
     work = JobSet(

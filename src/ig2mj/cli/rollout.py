@@ -59,8 +59,8 @@ def run(
       seed: random seed of start states and actions.
       split: set of start states: train or held_out.
       held_out: play the first EPISODES held-out start states, each once.
-      pool_size: number of start states; 0: all of the split. Of a task of yours whose start states were not sampled
-        yet: as many as episodes.
+      pool_size: number of start states; 0: all of the split, or as many as episodes where they neither ship nor were
+        sampled before.
       variant: variant of the activity's objects: 1 and 2 use other models of the same categories.
       object: {object}. Default: those that the policy was trained with.
       video: video of the first episode of the first world (.mp4, .gif), or five of its frames in a row (.png,
@@ -112,7 +112,7 @@ def run(
         observations=VECTORS if policy is None else policy.observations,
         relaxed_thresholds=relaxed_thresholds,
         split=split,
-        pool_size=pool_size or few_rows(env, split, max(episodes, worlds), objects) or None,
+        pool_size=pool_size or few_rows(env, split, max(episodes, worlds), objects, grasping, variant) or None,
         variant=variant,
         objects=objects,
         looks=None if policy is None else looks_of(policy),

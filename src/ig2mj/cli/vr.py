@@ -51,7 +51,7 @@ def run(
       grasping: assisted, sticky, mitten or physical.
       seed: random seed.
       row: number of the start state; -1: a random one.
-      pool_size: number of start states; 0: all that the task has.
+      pool_size: number of start states; 0: all that the task has, or a few where they are sampled first.
       object: {object}.
       seconds: end after this many seconds; 0: run until you end it.
       timing: show every two seconds how a frame's time divides into physics, states, rendering and waiting.
@@ -88,10 +88,12 @@ def run(
 
 def _environment(task: str, grasping: str, pool_size: int, row: int, objects: tuple[str, ...]):
     from ig2mj.cli.common.objects import note_changes
+    from ig2mj.cli.common.tasks import ROWS, few_rows
     from ig2mj.errors import Ig2mjError
     from ig2mj.vr.session import person_environment
 
-    env = person_environment(task, grasping, pool_size=pool_size or None, objects=objects)
+    rows = pool_size or few_rows(task, "train", max(ROWS, row + 1), objects, grasping)
+    env = person_environment(task, grasping, pool_size=rows or None, objects=objects)
     note_changes(env.scene, objects)
     if row >= env.core.starts.pool.size:
         raise Ig2mjError(f"--row {row}: the task has start states 0 to {env.core.starts.pool.size - 1}")

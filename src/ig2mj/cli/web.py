@@ -154,6 +154,7 @@ def _task(
     name: str, worlds: int, engine: str, agent: str, robot: str | None, seed: int, objects: tuple[str, ...]
 ) -> Source:
     from ig2mj.cli.common.objects import note_changes
+    from ig2mj.cli.common.tasks import ROWS, few_rows
     from ig2mj.cli.rollout import AGENTS, policy_named, who_acts
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.learn.policies import looks_of, objects_of
@@ -164,7 +165,8 @@ def _task(
         objects = objects_of(policy, agent)
     seen = VECTORS if policy is None else policy.observations
     looks = None if policy is None else looks_of(policy)
-    env = make(name, robot, worlds, engine, observations=seen, objects=objects, looks=looks)
+    rows = few_rows(name, "train", max(ROWS, worlds), objects) or None
+    env = make(name, robot, worlds, engine, observations=seen, objects=objects, looks=looks, pool_size=rows)
     note_changes(env.scene, objects)
     return Acting(env, who_acts(agent, policy, env, seed), seed)
 

@@ -37,22 +37,33 @@ def task_option(name: str) -> str:
     return f" --task {name}" if own else ""
 
 
-def few_rows(name: str, split: str, rows: int, objects: Sequence[str] = ()) -> int:
-    """Number of start states that a few episodes of a task need: `rows` where the task is of the user's and its pool
-    does not exist yet, so that sampling does not keep them waiting; 0: all of the split.
+ROWS = 8
+"""Start states that are sampled for a person, or for a page."""
+
+
+def few_rows(
+    name: str, split: str, rows: int, objects: Sequence[str] = (), grasping: str | None = None, variant: int = 0
+) -> int:
+    """Number of start states that a few episodes of a task need: `rows` where its pool neither ships nor exists yet,
+    so that sampling does not keep the user waiting; 0: all of the split.
+
+    Args:
+      rows: at least so many. The others: of `make`.
 
     Raises:
       As `make`.
     """
     from ig2mj.envs.registry import find_task
+    from ig2mj.tasks.activities import ACTIVITIES
     from ig2mj.tasks.added_objects import with_objects
     from ig2mj.tasks.pools import COUNT, start_states
     from ig2mj.tasks.task import Task
+    from ig2mj.tasks.variants import variant as task_variant
 
     task = find_task(name)
-    if not isinstance(task, Task) or task.code is None:
+    if not isinstance(task, Task) or (task.name in ACTIVITIES and not objects and not variant):
         return 0
-    whole = with_objects(task, tuple(objects))
+    whole = with_objects(task_variant(task, variant, grasping or task.grasping), tuple(objects))
     assert isinstance(whole, Task)
     there = start_states(whole, split).rows_at_hand
     return max(there, rows) if there < COUNT[split] else 0
