@@ -71,6 +71,7 @@ def ray_cluster(tmp_path_factory) -> Iterator[RayCluster]:
         "JAX_PLATFORMS": "cpu",
         "PYTHONPATH": os.pathsep.join([str(HERE), str(HERE.parent), os.environ.get("PYTHONPATH", "")]),
         "RAY_USAGE_STATS_ENABLED": "0",
+        "RAY_AUTH_MODE": "disabled",  # whether there is a token on this machine or not
         "RAY_TMPDIR": str(folder) if len(str(folder)) < 40 else "/tmp/ray",  # its sockets' names may not be long
     }
     head = node(environment, "--head", "--port", str(port), "--include-dashboard", "false")

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import threading
+import types
 
 import pytest
 from tiny_dataset import write_dataset
@@ -21,6 +22,10 @@ pytest.importorskip("ray")
 
 HERE = pathlib.Path(__file__).parent
 CONDITION = "(on_top apple_0 breakfast_table_0)"
+
+
+class AuthenticationError(Exception):
+    """As Ray's."""
 
 
 def ig2mj(cluster, folder: pathlib.Path, *words: str) -> subprocess.CompletedProcess:
@@ -176,6 +181,18 @@ def test_a_node_without_the_files_or_with_another_version_is_told_before_any_wor
 def test_an_address_where_nobody_is(address, said):
     with pytest.raises(ClusterError, match=said):
         map_jobs(jobs(1), Where(cluster=address))
+
+
+@pytest.mark.parametrize("error", [ConnectionError("Failed to connect"), AuthenticationError("no token")])
+def test_a_cluster_that_asks_for_a_token_says_how_it_is_given(monkeypatch, error):
+    monkeypatch.setattr(ray_nodes, "check_address", lambda address: None)
+
+    def init(**_):
+        raise error
+
+    fake = types.SimpleNamespace(init=init, exceptions=types.SimpleNamespace(AuthenticationError=AuthenticationError))
+    with pytest.raises(ClusterError, match=r"--cluster 10\.0\.0\.1:6379: .*RAY_AUTH_MODE=token"):
+        ray_nodes._connect(fake, "10.0.0.1:6379")
 
 
 def test_a_cluster_that_has_ended_is_not_waited_for(tmp_path, monkeypatch):

@@ -169,6 +169,9 @@ def _about(check: tuple[str, dict[str, Any]] | None) -> tuple[dict[str, str], st
         return versions(), "", " ".join(str(e).split()) or type(e).__name__
 
 
+TOKEN = "a cluster that asks for tokens needs RAY_AUTH_MODE=token, and its token in ~/.ray/auth_token"
+
+
 def check_address(address: str) -> None:
     """Checks that the address of a cluster accepts connections; for "auto", the address that Ray has recorded, if any.
 
@@ -211,10 +214,12 @@ def _connect(ray: Any, address: str) -> None:
     try:
         ray.init(address=address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
     except ConnectionError as e:
-        why = "this machine belongs to no cluster (`ray start`)" if address == "auto" else _line(e)
+        why = "this machine belongs to no cluster (`ray start`)" if address == "auto" else f"{_line(e)} ({TOKEN})"
         raise ClusterError(f"--cluster {address}: {why}") from e
     except RuntimeError as e:  # another version of Ray or Python
         raise ClusterError(f"--cluster {address}: {_line(e)}") from e
+    except getattr(ray.exceptions, "AuthenticationError", ()) as e:
+        raise ClusterError(f"--cluster {address}: there is no token here ({TOKEN})") from e
 
 
 def _alive(ray: Any) -> list[dict[str, Any]]:
