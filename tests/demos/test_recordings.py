@@ -110,6 +110,15 @@ def test_the_first_difference_is_named_by_run_frame_object_and_field(env, record
     assert " of steak_0/free: " in str(found)
 
 
+def test_measures_that_are_younger_than_a_recording_are_as_at_the_start(env, recorded, tmp_path):
+    copy = changed(recorded, tmp_path)
+    with h5py.File(copy, "a") as opened:
+        opened.attrs["columns"] = opened.attrs["columns"].replace("measures/held", "measures/old")
+        opened.move("frames/measures/held", "frames/measures/old")
+    with Recording(copy) as recording:
+        assert Replayer(recording, env=env)(check=True, runs=recording.runs[:2]).differences == []
+
+
 def test_another_engine_version_is_refused_by_action_and_warned_of_by_state(env, recorded, tmp_path):
     copy = changed(recorded, tmp_path)
     with h5py.File(copy, "a") as opened:

@@ -22,6 +22,7 @@ def test_an_episode_has_what_lerobots_evaluation_reads(repository):
     env = LeRobotVectorEnv("GraspingBook", 2, ("head", "right_wrist"), **options)
     assert isinstance(env, gymnasium.vector.VectorEnv) and env.call("_max_episode_steps") == (3, 3)
     assert env.call("task_description") == env.call("task") == ("Take the notebook from the coffee table.",) * 2
+    assert [one.task_description for one in env.envs] == list(env.call("task_description"))
     obs, info = env.reset(seed=[1, 2])
     assert {k: a.shape for k, a in obs["pixels"].items()} == {"rgb": (2, 32, 32, 3), "right_wrist": (2, 32, 32, 3)}
     assert env.observation_space.contains(obs) and info["is_success"].tolist() == [False, False]

@@ -144,6 +144,9 @@ class Replayer:
         self._labels = Labels(self.env.scene)
         rules, columns = self.env.core.rules, [name.removeprefix("frames/") for name in recording.columns]
         self._lacking = plugin_columns(None if rules is None else rules.initial, columns)
+        # Measures of the task that are younger than the recording: as an episode begins with them.
+        younger = [k for k, n in enumerate(self._names) if n.startswith("measures/") and n not in columns]
+        self._lacking |= {self._names[k]: np.asarray(self._like[k])[None] for k in younger}
         for run in recording.runs:
             if run.world >= worlds:
                 raise run.broken("attribute world", f"is {run.world}, and the file is of {worlds} worlds")
@@ -257,7 +260,7 @@ class Replayer:
         return resumed(self.env, frame, np.clip(begun, 0, size - 1), used)
 
     def _read(self, run: Run, start: int, stop: int) -> list[np.ndarray]:
-        """Frames of a run, with plug-ins' states that the file lacks as at the start. Raises InputError."""
+        """Frames of a run; what the file may lack is as at the start. Raises InputError."""
         return run.whole_frames(self._names, start, stop, self._like, self._lacking)
 
     def _frames(self, run: Run) -> Iterator[list[np.ndarray] | None]:

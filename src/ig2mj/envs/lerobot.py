@@ -10,6 +10,7 @@ themselves in the step that ends them.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -31,6 +32,29 @@ FIXED = ("observations", "num_envs", "worlds")
 def camera_key(camera: str) -> str:
     """Name of a camera's images in LeRobot's data sets and environments; `rgb` is the head's."""
     return "rgb" if camera == HEAD else camera.replace("/", "_")
+
+
+@dataclasses.dataclass(frozen=True)
+class _World:
+    """One world of a `LeRobotVectorEnv`, to be read and rendered; all worlds are stepped together.
+
+    Attributes:
+      whole: the environment. world: number of this one.
+    """
+
+    whole: LeRobotVectorEnv
+    world: int
+
+    @property
+    def task(self) -> str:
+        """Its instruction."""
+        return self.whole.task[self.world]
+
+    task_description = task
+
+    def render(self) -> np.ndarray:
+        """Its image, uint8 [height, width, 3]."""
+        return self.whole.call("render", self.world)[0]
 
 
 class LeRobotVectorEnv(GymVectorEnv):
@@ -66,6 +90,11 @@ class LeRobotVectorEnv(GymVectorEnv):
     task_description = task
 
     @property
+    def envs(self) -> tuple[_World, ...]:
+        """The worlds one by one, as vector environments of copies have them."""
+        return tuple(_World(self, world) for world in range(self.num_envs))
+
+    @property
     def _max_episode_steps(self) -> int:
         return self.env.task.horizon
 
@@ -74,7 +103,8 @@ class LeRobotVectorEnv(GymVectorEnv):
         if name in ("task", "task_description"):
             return self.task
         if name == "render":
-            return tuple(self.env.render(self._state(), world) for world in range(self.num_envs))
+            worlds = args or range(self.num_envs)
+            return tuple(self.env.render(self._state(), world) for world in worlds)
         value = getattr(self, name)
         return tuple(value(*args, **kwargs) if callable(value) else value for _ in range(self.num_envs))
 
