@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ig2mj.errors import StateError, UnknownNameError
+from ig2mj.predicates.literals import ArityError
 from ig2mj.sampling.conditions import bind, order, read_conditions
 from ig2mj.sampling.many import make_sampler, sample
 from ig2mj.sampling.placement import RESTING_PENETRATION, Budget
@@ -97,6 +98,18 @@ def test_an_impossible_request_ends_within_its_budget_and_says_why(sampler):
 def test_fixed_objects_are_not_placed(sampler):
     with pytest.raises(StateError, match="fixed"):
         sampled(sampler, "(on_top fridge_0 breakfast_table_0)")
+
+
+@pytest.mark.parametrize("predicate", ["on_top", "inside", "under", "next_to", "in_contact_with"])
+def test_nothing_is_placed_at_what_has_no_collision_geometry(sampler, predicate):
+    with pytest.raises(StateError, match="'ceilings' has no collision geometry"):
+        sampled(sampler, f"({predicate} apple_0 ceilings)")
+
+
+def test_a_condition_has_all_its_arguments(sampler):
+    for text in ("(on_top)", "(on_top apple_0)", "(on_floor)"):
+        with pytest.raises(ArityError, match="takes 2 arguments"):
+            sampled(sampler, text)
 
 
 def test_objects_that_bear_each_other_in_a_circle_are_refused():

@@ -109,8 +109,8 @@ class RowSampler:
         Raises:
           StateError, AbilityError, UnknownNameError: a condition that can never be made true.
         """
-        plan = order(conditions, self._fixed, self._ranks if keep else None)
         self._truths_of(tuple(conditions))  # refuses what can never hold
+        plan = order(conditions, self._fixed, self._ranks if keep else None)
         self.query.load(self._start)
         self._states, self._keep, self._again = self._initial, keep, frozenset(again)
         self._around = tuple(around)
@@ -223,6 +223,10 @@ class RowSampler:
         along = -1
         if rule.value and rule.predicate != "on_floor":
             along = object_index(self.model, rule.other_than(name))
+        for involved in {index, along} - {-1}:
+            if not (self.model.tables.piece_object == involved).any():
+                nothing = f"'{self.model.tables.object_names[involved]}' has no collision geometry"
+                raise StateError(f"{nothing}: {rule} cannot be made true by placing '{name}'")
         earlier = (*(c for _, placed in self._placed for c in placed), *self._around)
         moving = (*(n for n, _ in self._placed), *(c.arguments[0] for c in self._around))
         pushable = {object_index(self.model, n) for n in moving if n not in self._fixed and n != name}
