@@ -80,6 +80,7 @@ def test_forward_takes_up_what_was_changed_by_hand(simulation):
         (lambda s: s.object_pose("bok"), UnknownNameError, "near matches: book"),
         (lambda s: s.set_object_pose("table", [0, 0, 1]), PoseError, "object 'table' is fixed"),
         (lambda s: s.set_object_pose("box", [0, 0, np.nan]), PoseError, "position of object 'box' is not finite"),
+        (lambda s: s.set_object_pose("box", [0, 0, 1e30]), PoseError, "position of object 'box' is beyond the 1e"),
         (lambda s: s.set_object_pose("box", [0, 0, 1], [1, 0, 0, np.inf]), PoseError, "rotation of object 'box'"),
         (lambda s: s.set_object_pose("box", [0, 0, 1], [0, 0, 0, 0]), PoseError, "zero quaternion"),
         (lambda s: s.set_object_pose("box", [0, 1]), PoseError, "needs 3 numbers"),

@@ -17,7 +17,7 @@ from ..base.file_access import FileGuard
 from ..base.transforms import read_origin
 from ..base.xml_reader import Element, is_huge, number, numbers, read_xml, where
 from .urdf_geometry import GeometryReader
-from .urdf_leftovers import read_leftovers, warn_of_degrees
+from .urdf_leftovers import read_leftovers, warn_of_degrees, warn_of_macros
 from .urdf_materials import UrdfMaterials
 from .urdf_tree import check_counts, check_name, find_tree
 
@@ -59,6 +59,7 @@ def read_urdf(
     robot = read_xml(path, "robot", warnings)
     read_leftovers(robot, warnings)
     warn_of_degrees(robot, warnings)
+    warn_of_macros(robot, warnings)
     guard = FileGuard(path, root, mesh_folder, allow_outside, mesh_root=mesh_root, package_path=package_path)
     reader = GeometryReader(guard, UrdfMaterials(robot, guard, warnings), warnings)
     check_counts(robot, path)

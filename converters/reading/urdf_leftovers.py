@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 import re
 
-from ..base.xml_reader import Element, parse_number, shortened, where
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  it has no stubs
+
+from ..base.xml_reader import Element, local_name, parse_number, shortened, where
 
 VECTORS = (("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz"), ("mesh", "scale"), ("box", "size"))
 """Elements and attributes of three numbers."""
@@ -33,6 +35,15 @@ def read_leftovers(robot: Element, warnings: list[str]) -> None:
                     plain = " ".join(words[:3])
             if plain != text:
                 element.set(attribute, plain)
+
+
+def warn_of_macros(robot: Element, warnings: list[str]) -> None:
+    """What xacro would have replaced by links and joints is no part of a URDF."""
+    elements = (e for e in robot.iter(etree.Element) if "xacro" in (e.prefix, e.tag.partition(":")[0]))
+    names = {local_name(element) for element in elements}
+    if names:
+        listed = ", ".join(f"<xacro:{shortened(name.rpartition(':')[2], 40)}>" for name in sorted(names)[:10])
+        warnings.append(f"elements of xacro are left out: {listed} (expand the file with xacro)")
 
 
 UNLIMITED = 1000.0

@@ -78,4 +78,6 @@ def _finite(values: Vector, length: int, what: str) -> np.ndarray:
         raise PoseError(f"the {what} needs {length} numbers, not an array of shape {array.shape}")
     if not np.isfinite(array).all():
         raise PoseError(f"the {what} is not finite: {array.tolist()}")
+    if (np.abs(array) > mujoco.mjMAXVAL).any():
+        raise PoseError(f"the {what} is beyond the {mujoco.mjMAXVAL:g} that MuJoCo computes with: {array.tolist()}")
     return array

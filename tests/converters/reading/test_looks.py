@@ -217,6 +217,14 @@ def test_what_only_xacro_can_expand_is_refused_with_the_remedy(folder, word):
         read(folder, f'<link name="a"><collision><geometry><sphere radius="{word}"/></geometry></collision></link>')
 
 
+@pytest.mark.parametrize("declared", ['xmlns:xacro="http://www.ros.org/wiki/xacro"', ""])
+def test_macros_that_were_not_expanded_are_left_out_with_a_warning(folder, declared):
+    macros = '<xacro:property name="w" value="1"/><xacro:wheel name="left"/><xacro:wheel name="right"/>'
+    inside = f'<link name="a"><collision>{BOX}</collision></link>{macros}'
+    (warning,) = read(folder, inside, root=f'<robot name="m" {declared}>').warnings
+    assert warning == "elements of xacro are left out: <xacro:property>, <xacro:wheel> (expand the file with xacro)"
+
+
 # ---- OBJ
 
 
