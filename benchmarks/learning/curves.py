@@ -22,6 +22,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
+from benchmarks.harness.pages import between
 from benchmarks.harness.paths import RESULTS, ROOT
 
 PAGE = ROOT / "docs" / "guide" / "learning.md"
@@ -209,9 +210,9 @@ def main() -> None:
     (FOLDER / "curves.md").write_text("\n".join(lines) + "\n" + REMARK)
     print("\n".join(lines))
     if args.write:
-        before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
         made = tables(sorted(FOLDER.glob("*.csv")))
-        PAGE.write_text(f"{before}{BEGIN}\n\n{made}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+        page = between(PAGE.read_text(encoding="utf-8"), BEGIN, END, f"\n\n{made}\n\n")
+        PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ import sys
 import time
 from typing import Any
 
+from benchmarks.harness.pages import between
 from benchmarks.harness.paths import ROOT, environment, module
 from benchmarks.harness.results import RESULTS
 
@@ -191,10 +192,9 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
 
 def page_with(text: str, rows: list[dict[str, Any]]) -> str:
     """The page with the table of these rows."""
-    head, rest = text.split(BEGIN)
     dates = sorted({row["date"] for row in rows})
     when = [f"Measured: {' to '.join(dict.fromkeys((dates[0], dates[-1])))}.", ""] if dates else []
-    return "\n".join([head + BEGIN, "", *when, *table(rows), "", END + rest.split(END)[1]])
+    return between(text, BEGIN, END, "\n".join(["", "", *when, *table(rows), "", ""]))
 
 
 def measure(options: argparse.Namespace) -> int:

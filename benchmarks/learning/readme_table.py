@@ -10,6 +10,7 @@ import pathlib
 import re
 import sys
 
+from benchmarks.harness.pages import between
 from benchmarks.harness.paths import ROOT
 
 PAGE = ROOT / "README.md"
@@ -55,8 +56,7 @@ def _remarks(card: dict[str, str]) -> str:
 
 def page_with(text: str) -> str:
     """README.md with another table between the marks."""
-    before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
-    return before + BEGIN + text + END + rest.split(END)[1]
+    return between(PAGE.read_text(encoding="utf-8"), BEGIN, END, text)
 
 
 def _card(file: pathlib.Path) -> dict[str, str]:

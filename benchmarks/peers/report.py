@@ -12,6 +12,7 @@ import json
 import pathlib
 from collections.abc import Sequence
 
+from benchmarks.harness.pages import between
 from benchmarks.harness.paths import RESULTS, ROOT
 
 PAGE, PLOT = ROOT / "docs" / "notes" / "benchmarks.md", ROOT / "docs" / "images" / "peers.png"
@@ -153,8 +154,7 @@ def main() -> None:
     rows = read(args.rows or sorted((RESULTS / "peers").glob("*.jsonl")))
     if not rows:
         raise SystemExit("error: no rows with a speed; run benchmarks/peers/run.py on a GPU first")
-    before, rest = args.page.read_text().split(BEGIN)
-    args.page.write_text(before + BEGIN + "\n" + written(rows) + "\n" + END + rest.split(END)[1])
+    args.page.write_text(between(args.page.read_text(), BEGIN, END, f"\n{written(rows)}\n"))
     draw(rows, args.plot)
 
 

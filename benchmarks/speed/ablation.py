@@ -29,6 +29,7 @@ import threading
 import time
 from typing import Any
 
+from benchmarks.harness.pages import between
 from benchmarks.harness.paths import ROOT, WORK, environment, module
 from benchmarks.harness.results import command, keep_row
 from benchmarks.harness.waiting import Process, end_all
@@ -297,8 +298,8 @@ def _cell(row: dict[str, Any]) -> str:
 def write(files: list[pathlib.Path]) -> None:
     """The table between its marks in docs/notes/gpu.md."""
     rows = [json.loads(line) for file in files for line in file.read_text(encoding="utf-8").splitlines()]
-    before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
-    PAGE.write_text(before + BEGIN + "\n" + table(rows) + "\n" + END + rest.split(END)[1], encoding="utf-8")
+    page = between(PAGE.read_text(encoding="utf-8"), BEGIN, END, f"\n{table(rows)}\n")
+    PAGE.write_text(page, encoding="utf-8")
 
 
 def main(words: list[str]) -> None:

@@ -10,6 +10,7 @@ import json
 import sys
 from typing import Any
 
+from benchmarks.harness.pages import between
 from benchmarks.harness.paths import RESULTS, ROOT
 
 PAGE = ROOT / "README.md"
@@ -36,8 +37,7 @@ def table() -> str:
 
 def page_with(text: str) -> str:
     """README.md with another table between the marks."""
-    before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
-    return before + BEGIN + text + END + rest.split(END)[1]
+    return between(PAGE.read_text(encoding="utf-8"), BEGIN, END, text)
 
 
 def _block(block: tuple[str, list[tuple[str, str]]], unit: str) -> str:

@@ -17,6 +17,7 @@ import math
 import pathlib
 from typing import Any
 
+from benchmarks.harness.pages import between
 from benchmarks.harness.paths import RESULTS, ROOT
 
 PAGE = ROOT / "docs" / "notes" / "scale.md"
@@ -252,9 +253,8 @@ def main() -> None:
     made = tables(args := parser.parse_args())
     print(made)
     if args.write:
-        text = PAGE.read_text(encoding="utf-8")
-        before, rest = text.split(BEGIN)
-        PAGE.write_text(f"{before}{BEGIN}\n\n{made}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+        page = between(PAGE.read_text(encoding="utf-8"), BEGIN, END, f"\n\n{made}\n\n")
+        PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -96,11 +96,6 @@ def metal(rgb: tuple[float | int, ...], seed: int, size: int = 96) -> Texture:
     return shaded(rgb, noise((size, size), (size, 3), rng), 0.10)
 
 
-def ceramic(rgb: tuple[float | int, ...], seed: int, size: int = 64) -> Texture:
-    """Glazed, almost even."""
-    return shaded(rgb, fractal((size, size), (3, 3), np.random.default_rng(seed)), 0.03)
-
-
 def glass(rgb: tuple[float | int, ...], seed: int, size: int = 64) -> Texture:
     """What is seen in a pane or a mirror: light bands across."""
     y, x = np.mgrid[:size, :size] / size

@@ -28,7 +28,7 @@ from ig2mj.engine.mjx.physics import MjxPhysics, own_device
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.engine.warp.patches import graphs_kept, pins
 from ig2mj.engine.warp.unwritten import unwritten_is_zero
-from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.errors import EngineError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.looks.costume import Followers
 from ig2mj.looks.home_plan import covered_triangles
@@ -36,7 +36,7 @@ from ig2mj.looks.state_looks import OF_MATERIAL, lamp_geoms, tinted_materials
 from ig2mj.looks.visual import visual_owners
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN
-from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, check_request
+from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, camera_id, check_request
 from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, mergeable, rigid_parts, tables_of
 from ig2mj.sensors.particle_slots import Slots, fill_slots
 from ig2mj.sensors.ray_cameras import sectors_of, set_rays, set_rows
@@ -122,7 +122,7 @@ class BatchCamera:
             raise EngineError(f"lights and fields of view are the same in all worlds here: {obstacle}")
         sectors = [s.camera for s in self._sectors]
         self._host = host = make_render_model(engine.scene, particles, sectors, looks, self._lit)
-        self.cameras = [_camera_id(host, name) for name in cameras]
+        self.cameras = [camera_id(host, name) for name in cameras]
         if rgb and cameras:
             fit_textures(host, float(2 * np.tan(np.deg2rad(host.cam_fovy[self.cameras].min()) / 2) / height))
         self._covered = {} if looks == PLAIN else covered_triangles(engine.scene)
@@ -144,7 +144,7 @@ class BatchCamera:
             render_depth=self._for_each(depth, True),
             render_seg=self._for_each(segmentation, False),
             enabled_geom_groups=list(groups),
-            cam_active=[*self.cameras, *(_camera_id(host, s.camera) for s in self._sectors)],
+            cam_active=[*self.cameras, *(camera_id(host, s.camera) for s in self._sectors)],
             background_color=BACKGROUND,
             use_shadows=shadows,
             enable_backface_culling=cull_backfaces,
@@ -340,7 +340,7 @@ class BatchCamera:
         of_cameras = {name: pose for name, pose in eyes.items() if name not in self._patterns}
         of_sectors = {sector.camera: sector.pose(dict(eyes)) for sector in self._sectors}
         for name, (eye_pos, eye_quat) in {**of_cameras, **of_sectors}.items():
-            camera = _camera_id(self._host, name)
+            camera = camera_id(self._host, name)
             camera_pos, camera_quat = camera_pos.at[:, camera].set(eye_pos), camera_quat.at[:, camera].set(eye_quat)
         if rendered is not None:
             there = jnp.asarray(rendered)[:, None, None]
@@ -451,13 +451,6 @@ class BatchCamera:
             particle = jnp.take_along_axis(slots.owner, jnp.clip(geom - geoms, 0, self.slots - 1), axis=1)
             owner = jnp.where(geom >= geoms, particle, owner)
         return jnp.where(geom >= 0, owner, NOTHING)
-
-
-def _camera_id(model: mujoco.MjModel, name: str) -> int:
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, name)
-    if number < 0:
-        raise UnknownNameError("camera", name, [model.camera(c).name for c in range(model.ncam)])
-    return number
 
 
 def _unpack(packed: Array) -> Array:

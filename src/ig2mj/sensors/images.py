@@ -9,12 +9,13 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
+import mujoco
 import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float, Int, UInt8
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.errors import EngineError
+from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.sensors.particle_slots import Slots
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.draw import Draw
@@ -97,3 +98,11 @@ def check_request(
         raise EngineError(f"rows {rows[0]} to {rows[1]} are empty for images of {height} rows")
     if (cameras and (not any(requested) or min(width, height) < 1)) or not (cameras or rays):
         raise EngineError("a camera must have pixels and produce at least one of rgb, depth and segmentation")
+
+
+def camera_id(model: mujoco.MjModel, name: str) -> int:
+    """Number of a camera. Raises UnknownNameError: the model has no such camera."""
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, name)
+    if number < 0:
+        raise UnknownNameError("camera", name, [model.camera(c).name for c in range(model.ncam)])
+    return number

@@ -20,14 +20,14 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.base import Engine
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.errors import EngineError
 from ig2mj.geometry.frustum import spheres_in_view
 from ig2mj.looks import visual_of
 from ig2mj.looks.state_looks import OF_MATERIAL, lamp_geoms, tinted_materials
 from ig2mj.scene.geom_groups import HIDDEN_GROUP, VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.gl_canvas import Canvas
-from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, check_request
+from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, camera_id, check_request
 from ig2mj.sensors.particle_slots import Slots, fill_slots
 from ig2mj.sensors.render_model import mean_colours
 from ig2mj.sensors.tints import STATES, SWITCHED_ON, UNTINTED, tinted, tints, tints_of_geoms
@@ -73,7 +73,7 @@ class NativeCamera:
         self._visual = visual_of(engine.scene, looks)
         self._drawn = copy.copy(self._visual.model)  # its colours change with the states
         self._colours = self._drawn.geom_rgba.copy(), self._drawn.mat_rgba.copy()
-        self.cameras = {name: _camera_id(self._drawn, name) for name in cameras}
+        self.cameras = {name: camera_id(self._drawn, name) for name in cameras}
         self._visible = np.isin(np.arange(mujoco.mjNGROUP), list(groups)).astype(np.uint8)
         if self._visible[HIDDEN_GROUP]:
             raise EngineError(f"geom group {HIDDEN_GROUP} is never seen (take the groups 0 to {HIDDEN_GROUP - 1})")
@@ -264,10 +264,3 @@ def _matrix(quat: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
     matrix = np.zeros(9)
     mujoco.mju_quat2Mat(matrix, quat.astype(np.float64))
     return matrix.reshape(3, 3)
-
-
-def _camera_id(model: mujoco.MjModel, name: str) -> int:
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, name)
-    if number < 0:
-        raise UnknownNameError("camera", name, [model.camera(c).name for c in range(model.ncam)])
-    return number

@@ -1,7 +1,7 @@
 """A gate before pages and web sockets, and a small server of both in a thread of its own.
 
     access = access_for(host, port, token, certificate, key)
-    server = PageServer(access, Pages.of_folder(folder), talk)
+    server = PageServer(access, Pages(files), talk)
     server.start()
     print(server.url)
 
@@ -19,7 +19,6 @@ import hmac
 import http
 import logging
 import mimetypes
-import os
 import pathlib
 import re
 import secrets
@@ -222,15 +221,6 @@ class Pages:
         self._plain = {name: body for name, body in files.items()}
         self._kinds = {name: kinds.get(name) or content_type(name or "index.html") for name in files}
         self._packed = {name: _pack(files[name]) for name in self._lasting}
-
-    @classmethod
-    def of_folder(cls, folder: str | os.PathLike) -> Pages:
-        """All files below a folder; its index.html is also the first page."""
-        root = pathlib.Path(folder)
-        files = {f.relative_to(root).as_posix(): f.read_bytes() for f in sorted(root.rglob("*")) if f.is_file()}
-        if "index.html" in files:
-            files[""] = files["index.html"]
-        return cls(files)
 
     def __call__(self, connection: ServerConnection, request: Request) -> Response | None:
         """The page that is asked for, or status 404; None for a web socket."""

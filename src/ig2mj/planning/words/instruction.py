@@ -34,11 +34,5 @@ class Instruction:
                 key = (condition.predicate, condition.arguments)
                 found.pop(key, None)
                 found[key] = condition
-        words = [expression(c) for c in found.values()]
+        words = [str(c) for c in found.values()]
         return words[0] if len(words) == 1 else f"(and {' '.join(words)})"
-
-
-def expression(condition: Condition) -> str:
-    """A condition in the form that `ig2mj.predicates.parse` reads."""
-    inner = f"({' '.join((condition.predicate, *condition.arguments))})"
-    return inner if condition.value else f"(not {inner})"
