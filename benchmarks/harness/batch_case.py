@@ -110,7 +110,7 @@ class Case:
         Args:
           home: folder, or name of a shipped home.
           hand: with a hand that can push, or with `robot`; else nothing moves.
-          profiles: folder with `<home>/engine_profile.json`; then the one beside the manifest; then it is measured.
+          profiles: folder with `<home>/engine_profile.json`; then the one next to the manifest; then it is measured.
           alone: held while buffer sizes are measured, where nobody else's timing may be disturbed.
           robot: one of `ROBOTS` instead of the hand.
         """

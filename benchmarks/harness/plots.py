@@ -89,7 +89,7 @@ def curves(
     ylabel: str,
     log: bool = True,
 ) -> None:
-    """A panel per name, in each a line per series of points (x, y). x is logarithmic, y too unless told otherwise."""
+    """A panel per name, in each a line per series of points (x, y). x is logarithmic, y too by default."""
     count = max(1, len(panels))
     figure, row = plt.subplots(1, count, figsize=(4.2 * count + 0.8, 4.2), layout="constrained", squeeze=False)
     for axes, (title, series) in zip(row[0], panels.items(), strict=False):

@@ -58,7 +58,7 @@ class Process:
             except queue.Empty:
                 return None
             if line is None:
-                self._lines.put(None)  # it has ended: the same for whoever asks again
+                self._lines.put(None)  # it has ended: the same for every later call
                 return None
             if line.startswith(word):
                 return json.loads(line[len(word) :])

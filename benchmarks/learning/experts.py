@@ -6,7 +6,7 @@
 
 First the pools of held-out states are sampled, as far as they are not in the cache. Then every case is cut into parts
 of `--worlds` episodes, each played in a process of its own, native engine, one thread. A part that is done adds a line
-to `rows.jsonl` and is not done again (with `--anew` it is). At the time limit what still runs is given up; the lines
+to `rows.jsonl` and is not done again (with `--force` it is). At the time limit what still runs is given up; the lines
 stay.
 """
 
@@ -202,7 +202,7 @@ def measure(options: argparse.Namespace) -> int:
     end = time.monotonic() + 60 * options.minutes
     options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / "rows.jsonl"
-    there = set() if options.anew else {_key(row) for row in read_rows(file)}
+    there = set() if options.force else {_key(row) for row in read_rows(file)}
     todo = [part for part in parts(options) if part.key not in there]
     if todo:
         names = dict.fromkeys(part.task for part in todo)
@@ -236,7 +236,7 @@ def main() -> int:
     parser.add_argument("--worlds", type=int, default=25, help="episodes of a part, side by side in one process")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--minutes", type=float, default=60.0, help="after which it ends with what it has")
-    parser.add_argument("--anew", action="store_true", help="play what has been played, too")
+    parser.add_argument("--force", "--anew", action="store_true", help="play what has been played, too")
     parser.add_argument("--out", type=pathlib.Path, default=ROWS.parent)
     parser.add_argument("--table", action="store_true", help=f"only write the table of {PAGE.name}")
     parser.add_argument("--pools", action="store_true", help=argparse.SUPPRESS)

@@ -9,7 +9,7 @@ folder of its own; `--merge FOLDER...` makes one table and plot of them.
 Demonstrations of the scripted expert, slowed down so that the task takes as long as the paper's people took (more than
 10 s), with noise on every action. Hands hold by assisted grasping. A clone learns the actions that were done, from the
 poses of objects and proprioception ("state") or from 128x128 RGB-D and proprioception ("rgbd"). The closing of the
-hands is replayed from the demonstration, as in the paper, or learnt like the rest. Then each demonstration of a
+hands is replayed from the demonstration, as in the paper, or learned like the rest. Then each demonstration of a
 held-out start state is replayed until so many seconds before its end, and the policy takes over.
 
 Axes: W worlds, T steps, n numbers of an action.
@@ -103,7 +103,7 @@ def collect(env: Environment, perception: Perception, count: int, pace: float, n
 
 
 def demos_of(shown: Sequence[Shown], chosen: np.ndarray) -> Demos:
-    """As cloning takes them; `chosen`: numbers of the action that are learnt."""
+    """As cloning takes them; `chosen`: numbers of the action that are learned."""
     fields = {n: np.concatenate([getattr(s, n) for s in shown]) for n in ("action", "vector", "picture")}
     seen, action = Seen(jnp.asarray(fields["vector"]), jnp.asarray(fields["picture"])), fields["action"][:, chosen]
     nothing = jnp.zeros(len(action))

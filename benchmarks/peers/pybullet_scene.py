@@ -86,7 +86,7 @@ def write_bullet_scene(
     Args:
       scene: converted from the dataset.
       dataset_root: the dataset it was converted from.
-      extra: bodies beside the home's, a robot's; their files are in `folder` already.
+      extra: bodies in addition to the home's, a robot's; their files are in `folder` already.
 
     Raises:
       InputError: a model is not in the dataset, or broken.
@@ -258,7 +258,7 @@ def write_obj(
     """Writes an OBJ with one `o` group per (vertices [n, 3], faces [m, 3]); Bullet makes one hull of each.
 
     Args:
-      uv: [n, 2] per vertex of a single group. material: an .mtl file beside it, with a material "skin".
+      uv: [n, 2] per vertex of a single group. material: an .mtl file next to it, with a material "skin".
     """
     lines = [] if material is None else [f"mtllib {material}"]
     start = 1

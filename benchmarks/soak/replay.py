@@ -54,7 +54,7 @@ class Dump:
 
 
 def replay(file: pathlib.Path) -> list[dict[str, Any]]:
-    """Runs a dump natively and prints when its object is fast or outside, and its deep contacts before that.
+    """Runs a dump on the native engine and prints when its object is fast or outside, and deep contacts before.
 
     Returns:
       One entry for each control step: speed (m/s) and place (m) of the object, its deepest overlaps by geom (m).

@@ -20,14 +20,14 @@ from ig2mj.scene.scene import Scene
 from ig2mj.worlds import guards
 
 FLAGS = ("overflow", "not_finite", "fell", "outside", "too_fast")
-"""What a world counts as, the first that is true. The guards' flags, and `outside`: an object beside the house's floors
+"""What a world counts as, the first that is true. The guards' flags, and `outside`: an object off the house's floors
 or below them (`House.lost`)."""
 
 OUTSIDE = 1 << 8
 """Beside `guards.Flag`."""
 
 BEYOND = guards.BELOW_FLOOR
-"""Metres beside every floor, or below the lowest one's surface, from which an object's centre of mass is outside."""
+"""Metres off every floor, or below the lowest one's surface, from which an object's centre of mass is outside."""
 
 NEVER = 10**6
 """Control steps since an object was held that never was."""
@@ -67,7 +67,7 @@ class House:
         return dataclasses.replace(self, low=np.array([*self.low[:2], floor]))
 
     def lost(self, com: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
-        """Metres by which centres of mass are beside all floors or below the lowest, whichever is more, less `BEYOND`.
+        """Metres by which centres of mass are off all floors or below the lowest, whichever is more, less `BEYOND`.
 
         Above zero is lost: it comes to rest in the house no more. What a hand lifts over the walls, or what flies above
         the floors, comes down on them, and is lost only where it comes down elsewhere.
@@ -194,7 +194,7 @@ class Watch:
         }
 
     def _holder(self, hand: int, since: int) -> dict[str, Any]:
-        """Who holds or held the object, and for how many control steps it has been free; nothing where nobody did."""
+        """Who holds or held the object, and for how many control steps it has been free; nothing where no hand did."""
         if since >= NEVER:
             return {}
         return {"held_by": self.model.body(int(self.tables.hand_body[hand])).name, "free_for": since}

@@ -9,7 +9,7 @@ Every row says what hand or robot really did (`harness/disturbance.py`), how man
 numbers, and in how many an object left the house. A row with any of the first two or more than one in a thousand of the
 last does not count (`counts` is false), nor does one whose hand touches nothing.
 
-Several of these may run at once (`suite.py`): what is timed runs under a lock, everything else beside each other.
+Several of these may run at once (`suite.py`): what is timed runs under a lock, everything else at the same time.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ def _round(ratio: Any) -> float:
 
 
 def own_dofs(case: Case) -> int:
-    """Degrees of freedom of whoever acts."""
+    """Degrees of freedom of the agents."""
     return int((case.scene.tables.body_agent[case.scene.model.dof_bodyid] >= 0).sum())
 
 

@@ -126,7 +126,7 @@ def _all(rows: list[Row]) -> Table:
         )
     title = (
         "All rows. contact: steps in which the hand presses on a loose object; moved: objects per world by over 2 cm; "
-        "awake: degrees of freedom beside those of the hand or robot; lost: worlds that overflowed / without numbers / "
+        "awake: degrees of freedom but for hand and robot; lost: worlds that overflowed / without numbers / "
         "that lost an object (not counted in older rows)"
     )
     return results.table(title, columns, lines)

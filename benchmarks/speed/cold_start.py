@@ -7,7 +7,7 @@ A process of its own measures, from its start to the first step's result: interp
 devices, the scene (of a home), making the worlds, start, first and second step. As for a user, kernels are compiled and
 loaded in threads from the making on, and the start waits for them; `kernels` has the seconds, since the process began,
 at which they were there. `--before` waits for them in the making. `processor` has the processor time of the phases, of
-all threads, which is less where something else is waited for, and more where threads work beside. `programs` has what
+all threads, which is less where something else is waited for, and more where several threads work. `programs` has what
 JAX traced, lowered and compiled that took a twentieth of a second. Kernels and XLA's programs are kept in the folder
 (IG2MJ_CACHE_DIR), and so is what CUDA's driver compiles. `--bytecode` keeps Python's in the folder, too, for machines
 that keep none of what is installed on them. `--profile` writes what Python did in the main thread, which makes
@@ -137,7 +137,7 @@ def main() -> None:
     parser.add_argument("--cache", type=pathlib.Path, required=True, help="folder for everything compiled")
     parser.add_argument("--again", action="store_true", help="with what an earlier run left there")
     parser.add_argument("--both", action="store_true", help="cold, then again")
-    parser.add_argument("--before", action="store_true", help="kernels before the worlds are made, not beside XLA")
+    parser.add_argument("--before", action="store_true", help="kernels before the worlds, not while XLA compiles")
     parser.add_argument("--one-by-one", action="store_true", help="kernels as steps need them, one after the other")
     parser.add_argument("--bytecode", action="store_true", help="Python's bytecode is kept in the folder, too")
     parser.add_argument("--profile", type=pathlib.Path, help="a table of Python's functions goes to this file")

@@ -1,4 +1,4 @@
-"""Table A.7: an idle home of about 20, 60 and 120 objects, 128x128 RGB, beside PyBullet on the same scenes.
+"""Table A.7: an idle home of about 20, 60 and 120 objects, 128x128 RGB, next to PyBullet on the same scenes.
 
     python -m benchmarks.speed.idle_a7 [--sizes 20 60] [--dataset ROOT --scenes NAME ...] [--no-pictures] [--out DIR]
 
@@ -76,7 +76,7 @@ class Args:
     pictures: bool = True
     """Time the renderers too."""
     pybullet: bool = True
-    """Measure PyBullet beside us; without it there are no ratios."""
+    """Measure PyBullet as well; without it there are no ratios."""
     work: pathlib.Path = WORK
     """Folder for what is built on the way."""
     out: pathlib.Path = results.RESULTS

@@ -4,7 +4,7 @@
 
 The paper's row is of "all objects physically simulated" with Fetch in the scene; its script puts Fetch at (1000, 1000,
 1000), where it falls all the time: both are measured, and the home without a robot
-beside them. Zero action: the robot's servos hold it. Homes rest 60 s; then MuJoCo alone, our physics with its view,
+next to them. Zero action: the robot's servos hold it. Homes rest 60 s; then MuJoCo alone, our physics with its view,
 with all states, and with pictures are timed in short blocks in turn on one core. A step is 1/30 s, four physics steps.
 Rates are medians by processor time.
 """

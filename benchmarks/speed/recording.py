@@ -1,5 +1,5 @@
 """What recording costs: processor time of an agent step with and without it, and bytes an hour of one world;
-and what a replay by state costs, beside drawing its pictures.
+and what a replay by state costs, without rendering its images.
 
     python -m benchmarks.speed.recording [--task CookingMeat] [--turns 20]
 

@@ -229,7 +229,7 @@ def list_kernels(group: Group, folder: pathlib.Path, until: float) -> None:
 
 
 def others(group: Group) -> list[Process]:
-    """The processes beside the first that can be measured alone: those of a simulator."""
+    """The processes after the first that can be measured alone: those of a simulator."""
     return group.processes[1:] if 1 in group.numbers and len(group.numbers) > 1 else []
 
 

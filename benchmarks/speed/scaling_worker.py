@@ -101,7 +101,7 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
     """SAC from pixels on an environment, as `ig2mj train` runs it: on one GPU one program for all of an iteration.
 
     It learns for `learnt` iterations before anything is measured. Where the worlds are a program of their own, arrays
-    come to lie elsewhere, most often in the first iterations, and Warp captures a CUDA graph anew for each place: 65 ms
+    come to lie elsewhere, most often in the first iterations, and Warp captures a CUDA graph for each place: 65 ms
     of a processor. `graphs_captured` says how often that still was so, `moves` which arrays did.
 
     With `apart` the worlds and the learning are two programs there, too. Only such a learner can list its kernels: the

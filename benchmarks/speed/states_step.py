@@ -1,8 +1,8 @@
-"""What extended states and a goal of ten literals cost, beside physics.
+"""What extended states and a goal of ten literals cost, without physics.
 
     python -m benchmarks.speed.states_step [--objects 60] [--worlds 64 512] [--json FILE]
 
-One world beside the native engine (microseconds per control step, on one core): everything asleep; one object that
+One world without the native engine (microseconds per control step, on one core): everything asleep; one object that
 moves, which the goal is about or not; without a goal; physics without states. Many worlds (microseconds per world
 and step of the one jitted function that also runs on a GPU).
 """

@@ -13,7 +13,7 @@ ENVIRONMENT = "IG2MJ_CACHE_DIR"
 """Environment variable that names another folder."""
 
 ABANDONED = 24 * 3600.0
-"""Seconds after which a half-written file belongs to no run any more."""
+"""Seconds after which a half-written file is abandoned."""
 
 
 def cache_folder(kind: str) -> pathlib.Path:

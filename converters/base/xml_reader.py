@@ -1,4 +1,4 @@
-"""XML that strangers wrote: tolerant of what is harmless, closed to what is not.
+"""Untrusted XML: tolerant of what is harmless, closed to what is not.
 
 Accepted, since real URDFs have it: a byte-order mark, blanks or text before `<?xml` or after the root, any version
 number, a wrong or missing encoding declaration, unbound namespace prefixes, a bare `&`, double hyphens in comments.

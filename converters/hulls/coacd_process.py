@@ -124,7 +124,7 @@ def main(given: str, found: str) -> None:
 
 
 def _end_with_parent() -> None:
-    """Waits until nobody holds the other end of standard input. CoACD runs without Python's lock, so this is heard.
+    """Waits until the other end of standard input is closed. CoACD runs without Python's lock, so this is heard.
 
     Without Python's buffer on top: a thread that holds its lock makes the interpreter abort when it ends.
     """

@@ -181,7 +181,7 @@ def _capped(mesh: trimesh.Trimesh, rings: list[list[int]]) -> trimesh.Trimesh | 
 def _opens_up(ring: np.ndarray, hull: Hull, others: list[Hull]) -> bool:
     """Whether a hole with this rim [k, 3] is of some size and faces up, as a bowl's or a box's does.
 
-    A hole that another part covers is only a face that nobody would have seen.
+    A hole that another part covers is only a hidden face.
     """
     corners = hull.vertices[hull.faces]
     total = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())

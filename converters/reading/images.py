@@ -1,4 +1,4 @@
-"""Images that strangers made, opened with an explicit list of formats: others may start a program (EPS)."""
+"""Untrusted images, opened with an explicit list of formats: others may start a program (EPS)."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def scale_model(model: ObjectModel, s: np.ndarray | tuple[float, float, float] |
     origins, axes, prismatic limits, inertials and the metadata (bbox_size, base_link_offset, links, parts,
     orientations' sizes; not `raw`) are scaled too; `Link.com` is filled. `scale_model(model, 1)` only bakes.
     An URDF's own mass stays; its inertia is that of the stretched body. Spheres and cylinders, which iGibson leaves
-    unscaled, are scaled, and become meshes where they are none any more.
+    unscaled, are scaled, and become meshes where the scale is not uniform.
 
     Raises:
       InputError: s is not positive and finite, or no rigid articulated result exists.

@@ -50,7 +50,7 @@ def read_ply(source: MeshSource) -> MeshContent:
 
 class _Files(Resolver):
     """Gives trimesh an image of one pixel for whatever a PLY names, so that it keeps texture coordinates and opens
-    nothing that a stranger made."""
+    nothing untrusted."""
 
     def __init__(self):
         self.image: str | None = None

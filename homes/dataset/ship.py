@@ -43,7 +43,7 @@ def used_assets(scene: pathlib.Path) -> set[pathlib.Path]:
 
 
 def remove_unused(homes: pathlib.Path) -> int:
-    """Deletes shared meshes and textures that no home and no object of the library uses any more; how many."""
+    """Deletes shared meshes and textures that no home and no object of the library uses; returns how many."""
     used: set[pathlib.Path] = set()
     for file in [*homes.glob("*/scene.xml"), *homes.glob(f"{FOLDER}/*/*/object.xml")]:
         used |= used_assets(file)

@@ -139,7 +139,7 @@ ANY_WAY = ("toy", "ball", "sock", "t-shirt", "apple", "orange", "lemon", "tomato
 
 
 def fill(home: HomeInProgress) -> Iterator[Placed]:
-    """Puts small objects, one per host in turn, so that all rooms get some, until nothing fits any more."""
+    """Puts small objects, one per host in turn, so that all rooms get some, until nothing more fits."""
     kits = {room.name: RoomKit(home, room) for room in home.plan.rooms}
     held: dict[str, int] = {}
     piles: dict[str, list[Placed]] = {}

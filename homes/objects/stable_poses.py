@@ -53,7 +53,7 @@ def centre_of_mass(model: HouseholdObject) -> np.ndarray:
 
 
 def stable_orientations(model: HouseholdObject) -> list[Orientation]:
-    """How the model can be put down, by its `rest`, the likeliest first.
+    """How the model can be put down, by its `rest`, the most likely first.
 
     "upright": only as built. "any": the stable poses of its hull with their probabilities. "standing": the same, but
     it stands as built seven times out of ten (a bottle), as iGibson's labels do by hand.

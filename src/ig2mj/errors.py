@@ -93,7 +93,7 @@ class EngineError(Ig2mjError):
 
 
 class LostWorldError(EngineError):
-    """A world's positions or velocities are not finite any more. It stays as it is until it is loaded or reset."""
+    """A world's positions or velocities are no longer finite. It stays as it is until it is loaded or reset."""
 
 
 class StaleStateError(Ig2mjError):

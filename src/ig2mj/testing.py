@@ -187,7 +187,7 @@ def _partial_reset(env: Environment, seed: int, actions: list[np.ndarray], like:
     for action in actions:
         state = env.step(state, action)
     alone = _play(env, seed, actions + actions)[-1]
-    _same(_of(~mask, _host(state)), _of(~mask, alone), "worlds beside others that were reset", like)
+    _same(_of(~mask, _host(state)), _of(~mask, alone), "worlds next to others that were reset", like)
 
 
 def _ends(env: Environment, seed: int, action: Float[np.ndarray, "W n"], like: Likeness) -> None:

@@ -169,7 +169,7 @@ def test_a_result_that_is_damaged_is_made_again(tmp_path):
 def test_a_run_that_finished_nothing_is_begun_anew(tmp_path):
     """Whether it failed, as for want of a cluster, or was killed."""
     with pytest.raises(ClusterError), Journal(tmp_path / "a.npz", {"rows": 1}):
-        raise ClusterError("nobody answers")
+        raise ClusterError("there is no answer")
     assert not list(tmp_path.iterdir())
     Journal(tmp_path / "a.npz", {"rows": 1})._unlock()  # as a kill leaves it
     with Journal(tmp_path / "a.npz", {"rows": 2}) as journal:

@@ -173,7 +173,7 @@ def test_a_node_without_the_files_or_with_another_version_is_told_before_any_wor
 @pytest.mark.parametrize(
     ("address", "said"),
     [
-        ("127.0.0.1:9", "--cluster 127.0.0.1:9: nobody answers there .Connection refused"),
+        ("127.0.0.1:9", "--cluster 127.0.0.1:9: there is no answer .Connection refused"),
         ("nonsense", "an address is HOST:PORT"),
         ("host:port", "an address is HOST:PORT"),
     ],
@@ -200,7 +200,7 @@ def test_a_cluster_that_has_ended_is_not_waited_for(tmp_path, monkeypatch):
     monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))
     (tmp_path / "ray").mkdir()
     (tmp_path / "ray" / "ray_current_cluster").write_text("127.0.0.1:9\n")
-    with pytest.raises(ClusterError, match="--cluster auto: nobody answers at 127"):
+    with pytest.raises(ClusterError, match="--cluster auto: there is no answer at 127"):
         map_jobs(jobs(1), Where(cluster="auto"))
 
 
@@ -214,5 +214,5 @@ def test_commands_ask_for_the_cluster_before_they_do_anything(tmp_path, monkeypa
     ):
         assert call([*words, "--cluster", "127.0.0.1:9"]) == 2
         error = capsys.readouterr().err
-        assert error.count("\n") == 1 and "127.0.0.1:9: nobody answers there" in error, words
+        assert error.count("\n") == 1 and "127.0.0.1:9: there is no answer" in error, words
     assert not list(tmp_path.iterdir()), "nothing was made"

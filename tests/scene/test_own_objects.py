@@ -198,7 +198,7 @@ def test_an_object_that_has_moved_is_found_again_in_a_library_by_its_hash(tiny_h
     was.rename(now)
     with pytest.raises(
         InputError,
-        match=r"run.h5: needs the object 'cup_0' \(mug/cup, hash .*neither in .*was/cup any more nor in a library",
+        match=r"run.h5: needs the object 'cup_0' \(mug/cup, hash .*neither in .*was/cup nor in a library",
     ):
         find_again(additions, "run.h5")
     monkeypatch.setenv("IG2MJ_OBJECTS", str(now.parent))

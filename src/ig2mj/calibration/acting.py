@@ -65,7 +65,7 @@ def act_at_random(
     Args:
       key: of each world's round. step: control steps since its start, the same in all worlds.
       share: of the range of actions that is drawn from.
-      action_steps: control steps after which the robot acts, as often as its controller was told.
+      action_steps: control steps after which the robot acts, at the controller's period.
     """
     low, high = share * jnp.asarray(controller.action_low), share * jnp.asarray(controller.action_high)
     keys = step_keys(key, step)

@@ -87,7 +87,7 @@ def hold(file: pathlib.Path, out: object) -> Hold:
 
 
 def _holder(opened: IO[str]) -> dict[str, Any] | None:
-    """Who wrote into a lock; None: nobody, who has let go of it, or an earlier version of this package."""
+    """The process that wrote into a lock; None: it has let go of it, or an earlier version of this package."""
     opened.seek(0)
     try:
         found = json.loads(opened.read(4096))

@@ -180,12 +180,12 @@ def check_address(address: str) -> None:
     """
     import ray  # noqa: F401
 
-    requested, what = address, "nobody answers there"
+    requested, what = address, "there is no answer"
     if address == "auto":  # Ray waits for minutes for a cluster that ended without removing its record
         requested = _recorded()
         if not requested:
             return
-        what = f"nobody answers at {requested}, where this machine's last cluster was (`ray start` begins one)"
+        what = f"there is no answer at {requested}, where this machine's last cluster was (`ray start` begins one)"
     parsed = urllib.parse.urlsplit(requested if "://" in requested else f"//{requested}")
     try:
         host, port = parsed.hostname, parsed.port

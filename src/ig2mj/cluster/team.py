@@ -1,6 +1,6 @@
 """`Team`: the processes of one training run, on one host or on several, and what they say to each other.
 
-Process 0 listens at the coordinator's address; the others connect, and all compare versions before JAX is told of one
+Process 0 listens at the coordinator's address; the others connect, and all compare versions before JAX learns of one
 another. The connections stay open: over them go a beat every few seconds, barriers, and the news that a process has
 died, which ends all the others with one line that names it. JAX has a watch of its own, which takes minutes, and ends
 processes without a word that a user could read.
@@ -209,7 +209,7 @@ class Team:
 
     def _connect(self, place: ProcessTopology, own: dict[str, Any], patience: float) -> int:
         """The others come to process 0; the port of JAX's coordinator."""
-        until, why = time.monotonic() + patience, "nobody answers"
+        until, why = time.monotonic() + patience, "there is no answer"
         while time.monotonic() < until:
             try:
                 link = _Link(socket.create_connection((place.host, place.port), timeout=5.0))

@@ -75,7 +75,7 @@ class FrameRows:
         self.own, self.batched = dict(zip(names, cuts, strict=False)), names[len(cuts) :]
 
     def __call__(self, state: EnvState) -> tuple[list[list[np.ndarray]], list[Any]]:
-        """Pieces of each recorded world, and arrays of all worlds; nobody changes them any more. Where a step uses up
+        """Pieces of each recorded world, and arrays of all worlds; they are not changed later. Where a step uses up
         the arrays of the one before, they are copied."""
         own, batched = self._engine.frame(state.batch.world.physics, self._worlds)
         return own, [*batched, *self._engine.kept(jax.tree.leaves(_besides_physics(state)))]

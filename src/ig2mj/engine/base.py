@@ -262,7 +262,7 @@ class Engine(Protocol):
 
         Raises:
           EngineError: the controls have another shape.
-          LostWorldError: (native engine) a world is not finite any more, and stays so until it is loaded. The others
+          LostWorldError: (native engine) a world is no longer finite, and stays so until it is loaded. The others
             were stepped, and go on with the same physics.
         """
         ...
@@ -341,7 +341,7 @@ class Engine(Protocol):
         ...
 
     def frame(self, physics: Physics, worlds: Sequence[int]) -> tuple[list[list[np.ndarray]], list[np.ndarray]]:
-        """All of physics for a recording, in arrays that nobody changes.
+        """All of physics for a recording, in arrays that are not changed later.
 
         Returns:
           Arrays of each given world, cut by `frame_cuts`; and the leaves of a `Snapshot` of all worlds. One of the two

@@ -30,7 +30,7 @@ class ModelLayout:
       extra_object, extra_qposadr, extra_dofadr: free joints of bodies split off an object.
       unit_object, unit_agent, unit_tree: owner of each unit, an object or an agent (the other one is -1), and its
         tree; tree -1: the owner's static part.
-      body_unit, geom_unit: unit of each body and geom; -1: nobody's (the world).
+      body_unit, geom_unit: unit of each body and geom; -1: none (the world).
       collides: [G] the geom takes part in contacts and belongs to an object or an agent.
       link_of_geom: [G] annotated link whose geom it is, -1 none.
       hand_of_geom: [G] hand that the geom is part of, -1 none.

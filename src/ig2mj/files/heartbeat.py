@@ -43,7 +43,7 @@ class Heartbeat:
         self.file.unlink(missing_ok=True)
 
     def touch(self) -> None:
-        """One beat. A sign that somebody removed is not made again."""
+        """One beat. A sign that was removed is not made again."""
         with contextlib.suppress(OSError):
             os.utime(self.file)
 

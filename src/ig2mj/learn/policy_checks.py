@@ -72,7 +72,7 @@ def check_card(card: Mapping[str, Any], file: object) -> None:
         raise InputError(file, str(e), element="card.json", fix=_FIX) from e
     refuse_path(known.depends.task, file, "card.json: depends.task")
     if known.net.net in REMOVED or (known.net.net == "glimpses" and not known.net.objects):
-        words = f"its encoder '{known.net.net}' is not supported any more"
+        words = f"its encoder '{known.net.net}' is no longer supported"
         raise InputError(file, words, element="card.json: net", fix="ig2mj 0.1.0 reads it")
     memory = known.net.recall
     if memory is None:

@@ -38,5 +38,5 @@ class Rung(Protocol):
         ...
 
     def ended(self, world: int) -> str | None:
-        """Why no primitive can begin in a world any more, in words, "" where its goal holds; None: one can."""
+        """Why no further primitive can begin in a world, in words, "" where its goal holds; None: one can."""
         ...

@@ -120,7 +120,7 @@ class SymbolicRung:
         self._worlds[world].held.append(name)
 
     def let_go(self, world: int, name: str, physics: Snapshot) -> None:
-        """An object is not held any more; `physics`: of the world from now on."""
+        """An object is no longer held; `physics`: of the world from now on."""
         self._worlds[world].held.remove(name)
         self._worlds[world].physics = physics
 

@@ -42,7 +42,7 @@ class GoalRows:
         self._last: dict[str, tuple[Array, list[bytes]]] = {}  # of each field the array compared last, and its rows
 
     def same(self, name: str, now: Array, before: Array) -> bool:
-        """Whether a field is the same in all that the goal can read of it; false where that cannot be told."""
+        """Whether a field is the same in all that the goal can read of it; false where that is unknown."""
         if now is before:
             return True
         rows = self._rows[name]

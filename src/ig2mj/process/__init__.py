@@ -1,7 +1,7 @@
 """Everything that ig2mj changes in its process as a whole, so that other code there knows what it meets.
 
 Importing ig2mj changes nothing. The functions below are called where the first engine, simulation or picture is made,
-or earlier by whoever wants to; a second call does nothing. What the user has decided stands.
+or earlier by any caller; a second call does nothing. What the user has decided stands.
 
 `ig2mj.cli.main` (the command, not the library):
   - The variable TF_CPP_MIN_LOG_LEVEL is 2, unless it is set: XLA's warnings are not printed, its errors are.

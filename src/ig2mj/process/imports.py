@@ -44,7 +44,7 @@ class _CalledLater:
 def find_devices() -> None:
     """JAX begins to look for its devices, in a thread: half a second with a GPU, most of it without Python.
 
-    Whoever asks for a device waits until they are found, and is told what went wrong.
+    A caller that asks for a device waits until they are found, and gets the error if there is one.
     """
     import jax
 

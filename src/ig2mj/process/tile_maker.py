@@ -29,7 +29,7 @@ def make(tiles: list[list[Any]], architecture: int) -> None:
 
 
 def main() -> None:
-    """Ends with an error where it finds another cache than the one it was told of."""
+    """Ends with an error where it finds another cache than the one it was given."""
     order = json.load(sys.stdin)
     import warp as wp
 

@@ -135,7 +135,7 @@ class Budget:
     Attributes:
       work: candidates that may be let go, and searches for candidates; each is one unit, some 5 to 20 ms, and those
         that take long to settle are more.
-      seconds: time after which nothing is begun any more; infinite unless somebody is waiting. clock: that measures
+      seconds: time after which nothing is begun; infinite unless a person is waiting. clock: that measures
         it; default: wall time.
     """
 

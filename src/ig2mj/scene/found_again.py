@@ -107,7 +107,7 @@ def _found(addition: Addition, file: str | os.PathLike) -> Addition:
     if not (same or called):
         what = f"the object '{addition.name}' ({addition.category}/{addition.model}, hash {addition.sha256[:12]})"
         fix = f"`ig2mj objects add DIR` with the folder that holds its folder '{was.name}'"
-        raise InputError(file, f"needs {what}, which is neither in {was} any more nor in a library", fix=fix)
+        raise InputError(file, f"needs {what}, which is neither in {was} nor in a library", fix=fix)
     return dataclasses.replace(addition, folder=str((same or called)[0].folder))
 
 

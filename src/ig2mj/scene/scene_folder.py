@@ -82,7 +82,7 @@ def write_start(folder: pathlib.Path, model: mujoco.MjModel, qpos: Sequence[floa
 
 
 def _drop_unused(root: ElementTree.Element) -> None:
-    """Removes meshes, materials and textures that nothing names any more."""
+    """Removes meshes, materials and textures that nothing names."""
     for tag, attributes in (("mesh", ("mesh",)), ("material", ("material",)), ("texture", ("texture",))):
         used = {e.get(a) for e in root.iter() if e.tag != tag for a in attributes}
         for section in root.findall("asset"):

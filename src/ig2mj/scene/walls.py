@@ -2,7 +2,7 @@
 
 What a hand presses into a thin wall, or what flies into it at an angle, is pushed out on the nearest side, and leaves
 the house. A deep wall gives it back. Contacts of a deep solid must not be as stiff as others', or they throw what is
-thin (`scene/floors.py`). Windows are closed on the outside by panes that nobody sees. `docs/notes/lost.md`.
+thin (`scene/floors.py`). Windows are closed on the outside by invisible panes. `docs/notes/lost.md`.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class SensorOptions:
       particles: the most particles of dust, stains and water that an image shows.
       rows: of all images the first row that is made and the first below those; the others are as if nothing were
         there. For those who look at no others: on a GPU they cost nothing then. None: all.
-      shadows: whether images have them; they cost six times the rest natively, twice on a GPU.
+      shadows: whether images have them; they cost six times the rest on the native engine, twice on a GPU.
       looks: how images show the home: one of `ig2mj.scene.scene.LOOKS`. Policies that see images were trained with
         `CAMERA_LOOKS`.
       cameras: width and height, or one number for both, of the images of cameras that have another size, by the

@@ -55,7 +55,7 @@ ABOVE, UPWARDS = (0.0, 0.0, 1e5), (0.0, 1.0, 0.0, 0.0)
 
 _KEPT: weakref.WeakKeyDictionary[Engine, list[Any]] = weakref.WeakKeyDictionary()
 """What the ray caster keeps, for as long as the engine whose worlds it sees: a compiled program that outlives its
-`BatchCamera` goes on using it, and nobody else would hold it."""
+`BatchCamera` goes on using it, and holds no reference to it."""
 
 
 class BatchCamera:
@@ -193,7 +193,7 @@ class BatchCamera:
         return [*(LIGHTS_PER_WORLD if self._lit else ()), *(FOV_PER_WORLD if self._zooms else ())]
 
     def _merge(self, groups: Sequence[int]) -> Tables | None:
-        """Hides the geoms that merged meshes show, and those that nobody sees, from the ray caster's boxes; None where
+        """Hides the geoms that merged meshes show, and invisible ones, from the ray caster's boxes; None where
         the scene shows no meshes."""
         host = self._host
         parts = rigid_parts(host, self.engine.scene.model, groups, self._covered)

@@ -60,7 +60,7 @@ def rigid_parts(
 
     Args:
       host: the render model, which has no joints. scene: the model that it was made from, with the same bodies first.
-      groups: of geoms that are seen. covered: by geom, which triangles nobody sees.
+      groups: of geoms that are seen. covered: by geom, which triangles are never seen.
     """
     data = mujoco.MjData(host)
     mujoco.mj_forward(host, data)

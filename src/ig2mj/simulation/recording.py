@@ -5,8 +5,8 @@
     other.replay("run.h5")                    # in a fresh process, too
 
 The input of a control step is MuJoCo's controls and what the robots' controllers remember; both are in the frame after
-it. What changes a world between steps (a pose that is set, a reset) begins a new run. Forces that somebody writes into
-`simulation.data` are recorded by nobody.
+it. What changes a world between steps (a pose that is set, a reset) begins a new run. Forces that are written into
+`simulation.data` are not recorded.
 """
 
 from __future__ import annotations

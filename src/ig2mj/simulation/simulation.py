@@ -269,7 +269,7 @@ class Simulation(Recorded):
 
         Raises:
           EngineError: ctrl has another length than the model has actuators.
-          LostWorldError: the world is not finite any more; nothing changes it but `reset` and what loads another.
+          LostWorldError: the world is no longer finite; nothing changes it but `reset` and what loads another.
         """
         row = None if ctrl is None else np.asarray(ctrl, np.float64)
         if row is not None and not row.ndim:

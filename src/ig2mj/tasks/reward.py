@@ -2,7 +2,7 @@
 
 The potential is  w_goal x literals that hold - w_distance x distances + w_pickup x first object is held
 - w_stain x stains that are left;  the reward of a step is how much it grew. Two traps of iGibson's code are avoided: a
-distance that is not defined any more keeps its last value there is (in iGibson it becomes 0, and the agent is paid for
+distance that is no longer defined keeps its last value there is (in iGibson it becomes 0, and the agent is paid for
 it), and the baseline is taken at the reset, so that the first step counts, too.
 
 Axes: W worlds, D distances.
@@ -83,7 +83,7 @@ class Reward:
         """The measures now.
 
         Args:
-          before: of the step before, for distances that are not defined any more; None: those are 0.
+          before: of the step before, for distances that are no longer defined; None: those are 0.
         """
         distances = []
         for d, (start, end) in enumerate(self._locate):

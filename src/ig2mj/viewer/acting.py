@@ -1,4 +1,4 @@
-"""One world of an environment in which somebody acts, as the interactive viewer takes it (`viewer.interactive.World`).
+"""One world of an environment with an agent that acts, as the interactive viewer takes it (`viewer.interactive.World`).
 
 An agent step lasts three of the viewer's steps; between two agent steps positions are interpolated, so that what is
 seen is a tenth of a second old and moves smoothly. When an episode ends, the next begins at the pool's next row.

@@ -78,7 +78,7 @@ class DesktopPoses:
             self._reach[self.chosen], self._twist[self.chosen] = 0.0, 0.0
 
     def release(self) -> None:
-        """Nothing is held any more."""
+        """No key is held."""
         self._down, self._buttons = frozenset(), 0
 
     def frame(self, seconds: float) -> PoseFrame:

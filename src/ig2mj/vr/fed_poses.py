@@ -1,4 +1,4 @@
-"""`FedPoses`: what sources of poses share that are told of their devices by another thread."""
+"""`FedPoses`: what sources of poses share whose devices report from another thread."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class FedPoses:
         self.area = PlayArea()
 
     def poll(self) -> PoseFrame | None:
-        """The newest frame; None while nobody is there."""
+        """The newest frame; None without a person."""
         with self._lock:
             return None if self._frame is None else dataclasses.replace(self._frame, area=self.area)
 

@@ -31,7 +31,7 @@ PRESSED = 0.5
 BODY_TURN = 1.0 / 3.0
 """rad by which the body is turned in a frame: what it can turn in 1/30 s (`humanoid.controller.MAX_TURN_RATE`). With
 iGibson's 1 rad a hand that is stretched out would have to go further in the body's frame than its own limit lets it,
-and would be dragged along whenever somebody looks around."""
+and would be dragged along whenever a person looks around."""
 
 LEVEL = 0.05
 """Horizontal length of the head's right below which it has no heading: it lies on its side."""
@@ -85,7 +85,7 @@ def action_of(frame: PoseFrame | None, robot: HumanoidPose, memory: Memory) -> t
     """The humanoid's action, in metres, radians and shares, and what to remember. Pure.
 
     Args:
-      frame: None: nobody is there.
+      frame: None: there is no person.
       robot: before the action.
     """
     action = np.zeros(28)

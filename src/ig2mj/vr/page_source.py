@@ -21,7 +21,7 @@ class PagePoses(FedPoses):
     """A `PoseSource` that pages feed. All methods may be called from any thread."""
 
     def __init__(self, stale: float = STALE) -> None:
-        """Nobody is there. `stale`: s without news from a headset after which nobody wears it."""
+        """No headset is connected yet. `stale`: s without messages after which a headset counts as taken off."""
         super().__init__()
         self._stale = stale
         self._desktop: DesktopPoses | None = None
@@ -72,7 +72,7 @@ class PagePoses(FedPoses):
     # For the session.
 
     def poll(self) -> PoseFrame | None:
-        """The newest frame, after what sticks and keys have done; None while nobody is there."""
+        """The newest frame, after what sticks and keys have done; None without a headset."""
         self.advance()
         return super().poll()
 
@@ -84,5 +84,5 @@ class PagePoses(FedPoses):
             pulse(hand, strength, seconds)
 
     def close(self) -> None:
-        """Nobody is there any more."""
+        """The person has left."""
         self.leave()

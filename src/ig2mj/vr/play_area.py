@@ -33,7 +33,7 @@ TURN = math.radians(30.0)
 """A turn by the stick: in one step, since a smooth one makes many people sick. iGibson's has none."""
 
 LONGEST = 0.1
-"""s of a step at most: after a pause nobody flies through the home."""
+"""s of a step at most: after a pause, people do not fly through the home."""
 
 
 def moved(area: PlayArea, frame: PoseFrame, seconds: float) -> PlayArea:

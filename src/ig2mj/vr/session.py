@@ -6,7 +6,7 @@
 
 Thirty times a second the newest frame of the devices becomes an action, the home makes a control step, and what came
 of it is published: poses (`track`), marks and tints of states, truth of the goal, pulses for the hands. Whoever draws
-takes these from another thread, at a rate of their own; nobody who draws ever waits for physics.
+takes these from another thread, at a rate of their own; rendering never waits for physics.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ class PoseSource(Protocol):
     """Devices of one person. Its methods may be called from any thread and return at once."""
 
     def poll(self) -> PoseFrame | None:
-        """The newest frame; None while nobody is there."""
+        """The newest frame; None without a person."""
         ...
 
     def stand_at(self, body: Pose) -> PoseFrame | None:

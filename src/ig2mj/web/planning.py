@@ -1,6 +1,6 @@
 """`Planned`: a robot in a home that carries out primitives, and plans for the goal, live in the page. See `Source`.
 
-Worlds of other sources have nobody who can be asked for a primitive.
+Worlds of other sources have no robot that carries out primitives.
 """
 
 from __future__ import annotations
@@ -196,7 +196,7 @@ class Planned:
         self._ended("stopped")
 
     def _ended(self, note: str) -> None:
-        """Nobody does anything any more."""
+        """All primitives end."""
         self._rung.stop(0)
         self._solving = None
         self._write(note)

@@ -54,7 +54,7 @@ _HOST = re.compile(
 
 _SILENT = logging.getLogger("ig2mj.web.websockets")
 _SILENT.addHandler(logging.NullHandler())
-_SILENT.propagate = False  # a stranger's broken request is no news
+_SILENT.propagate = False  # broken requests of others are not logged
 
 _POLICY = (
     "default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval'; "

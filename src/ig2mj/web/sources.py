@@ -1,6 +1,6 @@
 """What pages can look at: worlds of a home, an environment with someone who acts in it.
 
-A source belongs to the thread that simulates; nobody else calls it.
+A source belongs to the thread that simulates; no other thread calls it.
 
 Axes: W worlds.
 """
@@ -89,7 +89,7 @@ def live(engine: Engine, physics: Any, world: int) -> tuple[mujoco.MjModel, mujo
 
 
 class Home:
-    """Worlds of a home in which nobody acts. See `Source`."""
+    """Worlds of a home without actions. See `Source`."""
 
     def __init__(
         self,

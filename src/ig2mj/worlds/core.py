@@ -195,7 +195,7 @@ class Core:
           grasps: what hands hold; None: no hand takes hold of anything.
 
         Raises:
-          LostWorldError: (native engine) a world is not finite any more, which `step` only flags.
+          LostWorldError: (native engine) a world is no longer finite, which `step` only flags.
         """
         physics, view = self.physics_step(physics, ctrl)
         return self.after_physics(physics, view, states, controllers, grasps)

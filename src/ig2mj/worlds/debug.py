@@ -151,7 +151,7 @@ class DebugWorlds(Face):
         return said or ["right again by now"]
 
     def _first_lost(self, row: Snapshot) -> str:
-        """The first body whose position or velocity is not a number any more."""
+        """The first body whose position or velocity is not a number."""
         model = self.scene.model
         lost = [int(model.jnt_bodyid[j]) for j in range(model.njnt) if not _finite(_coordinates(model, row, j))]
         return model.body(lost[0]).name

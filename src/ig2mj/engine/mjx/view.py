@@ -1,6 +1,6 @@
 """`PhysicsView` from MJX arrays, shared by the two MJX engines. Pure JAX, all worlds at once.
 
-What nobody reads costs nothing: the view is made inside the jitted step, and XLA drops the parts that no state,
+What is not read costs nothing: the view is made inside the jitted step, and XLA drops the parts that no state,
 predicate or reward uses.
 
 Axes as in `ig2mj.engine.base` and `ig2mj.engine.view`; K boxed items of a `BoxTable`, V units of objects, S slots (the

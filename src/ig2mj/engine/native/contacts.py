@@ -181,10 +181,10 @@ def _joined(steps: list[StepContacts]) -> StepContacts:
 
 
 class FingerForces:
-    """`AgentView.finger_force`, computed when somebody reads it first."""
+    """`AgentView.finger_force`, computed on first read."""
 
     def __init__(self, plan: ForcePlan, pressing: Sequence[Sequence[StepContacts | KnownForces]]):
-        """`pressing`: of each world, contacts of the physics steps of a control step; nobody changes them any more."""
+        """`pressing`: of each world, contacts of the physics steps of a control step; they are not changed later."""
         self._plan, self._pressing = plan, pressing
         self._made: np.ndarray | None = None
 

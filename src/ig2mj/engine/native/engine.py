@@ -53,7 +53,7 @@ from ig2mj.scene.scene import Scene
 class NativeEngine(HostExecution, SceneEngine):
     """C MuJoCo behind the `Engine` protocol (see `ig2mj.engine.base`).
 
-    Views hold float32 numpy arrays that nobody changes afterwards. Where nothing changed since the last view, the same
+    Views hold float32 numpy arrays that are not changed afterwards. Where nothing changed since the last view, the same
     object is given again, and an array that did not change is the same array, so that `is` tells what may be skipped.
     """
 

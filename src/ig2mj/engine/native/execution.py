@@ -61,11 +61,11 @@ class HostExecution:
         return tree, world
 
     def copied(self, tree: Any) -> Any:
-        """See `Engine.copied`. Views are shared, since nobody changes them."""
+        """See `Engine.copied`. Views are shared, since they are never changed."""
         return jax.tree.map(_copy_of, tree, is_leaf=_is_view)
 
     def with_eyes(self, view: PhysicsView, poses: Callable[[], tuple[Array, Array]]) -> PhysicsView:
-        """See `Engine.with_eyes`: the poses are computed when somebody reads one of them."""
+        """See `Engine.with_eyes`: the poses are computed when one of them is read."""
         return with_eyes_later(view, poses)
 
     def write_with_view(

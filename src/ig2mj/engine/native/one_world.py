@@ -293,7 +293,7 @@ class World:
 
     def _note_forces(self, contacts: StepContacts) -> int:
         """Adds forces of a physics step of this control step: links' at once, since states read them in every step;
-        fingers' contacts are kept until somebody asks."""
+        fingers' contacts are kept until they are read."""
         changed, forces = Changed.NOTHING, self.statics.forces
         if contacts.met.kinds & LINK and forces.add_links(contacts, self.rows["link_force"]):
             self._has_force = True

@@ -73,7 +73,7 @@ class Pieces:
         self.cuts = [*scene, Cut(4), *agents, Cut(5), Cut(6), time, *fields]
 
     def __call__(self, world: World) -> list[np.ndarray]:
-        """Of a world's present state. Nobody changes them later, and nobody may."""
+        """Of a world's present state. They are not changed later, and must not be."""
         data, vector = world.data, np.empty(self._size)
         mujoco.mj_getState(world.model, data, vector, self._which)
         others = [data.eq_active.astype(bool), world.fields["eq_data"], data.tree_asleep.copy()]

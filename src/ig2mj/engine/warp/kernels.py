@@ -39,7 +39,7 @@ Launch = tuple[wp.Kernel, int]
 _TURN = threading.Lock()
 
 DEFAULT_BLOCK = 256
-"""Threads of a block where nobody says how many; Warp's."""
+"""Threads of a block unless a launch says how many; Warp's default."""
 
 
 def launches_of(act: Callable[[], Any]) -> list[Launch]:

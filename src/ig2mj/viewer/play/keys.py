@@ -120,7 +120,7 @@ def _together(first: str, second: str) -> str:
 
 
 class Held:
-    """Movements whose keys are down, as far as that can be told.
+    """Movements whose keys are down, as far as that can be determined.
 
     Attributes:
       until: when each movement ends, s, by command.

@@ -43,7 +43,7 @@ class OpenXRPoses(FedPoses):
         self._headset.pulse(hand, strength, seconds)
 
     def close(self) -> None:
-        """Nobody is there any more."""
+        """The person has left."""
         self.feed(None)
 
 

@@ -1,4 +1,4 @@
-"""Stages of a step whose results nobody reads, skipped.
+"""Skips stages of a step whose results are not read.
 
 - Islands' own numbering of degrees of freedom and constraints takes nine kernels after the solver. It serves solvers
   that work island by island, which neither ours nor MuJoCo Warp's compacted one does. Another function finds which
