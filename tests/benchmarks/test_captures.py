@@ -1,4 +1,4 @@
-"""Which arrays lie elsewhere, for which Warp captures a CUDA graph anew (`benchmarks/harness/captures.py`)."""
+"""Which arrays lie elsewhere, for which Warp captures a CUDA graph again (`benchmarks/harness/captures.py`)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_it_listens_where_warp_keeps_its_graphs(moves):
         self.captures[key] = object()
 
     callback(call, [1], [2], 7, "a")
-    callback(call, [1], [2], 7, "a")  # kept anew, which is no capture
+    callback(call, [1], [2], 7, "a")  # kept again, which is no capture
     callback(call, [1], [10], 7, "b")
     assert [row.get("moved") for row in moves.rows] == [None, 1]
     assert "doubled" in moves.rows[1]["call"] and len(call.captures) == 2

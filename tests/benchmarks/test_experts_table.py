@@ -47,6 +47,6 @@ def test_parts_on_file_are_not_played_again_even_those_of_before_there_were_vari
     options = argparse.Namespace(
         tasks=["SlicingFruit"], robots=["fetch"], grasping=["mitten"], variants=[0], episodes=50, worlds=25
     )
-    options.out, options.minutes, options.jobs, options.anew = tmp_path, 1.0, 1, False
+    options.out, options.minutes, options.jobs, options.force = tmp_path, 1.0, 1, False
     assert experts.measure(options) == 0
     assert "0 of 0 parts played" in capsys.readouterr().out
