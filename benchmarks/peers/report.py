@@ -16,7 +16,7 @@ from benchmarks.harness.pages import between
 from benchmarks.harness.paths import RESULTS, ROOT
 
 PAGE, PLOT = ROOT / "docs" / "notes" / "benchmarks.md", ROOT / "docs" / "images" / "peers.png"
-BEGIN, END = "<!-- peers: written by benchmarks/peers/report.py -->", "<!-- /peers -->"
+BEGIN, END = "<!-- begin: python -m benchmarks.peers.report -->", "<!-- end of the peers -->"
 
 ENGINES = {"ig2mj": "ig2mj", "mujoco_warp": "MuJoCo Warp", "genesis": "Genesis"}
 
@@ -27,8 +27,8 @@ NAMES = {
     ("genesis", "hibernation", "physics"): "Genesis, hibernation",
     ("genesis", "defaults", "physics"): "Genesis, defaults",
     ("ig2mj", "", "full"): "ig2mj, all states and a goal",
-    ("ig2mj", "", "camera"): "ig2mj, those and a 128x128 RGB-D picture every control step",
-    ("ig2mj", "", "agent"): "ig2mj, those and one picture an agent step (three control steps)",
+    ("ig2mj", "", "camera"): "ig2mj, those and a 128x128 RGB-D image every control step",
+    ("ig2mj", "", "agent"): "ig2mj, those and one image an agent step (three control steps)",
 }
 """What is said of an engine, variant and part; in the order of the columns and lines."""
 
