@@ -11,13 +11,11 @@ import concurrent.futures
 import concurrent.futures.process
 import dataclasses
 import multiprocessing
-import multiprocessing.connection
-import os
 import signal
-import threading
 from collections.abc import Mapping
 
 from ig2mj.cluster.jobs import Job, JobResult, JobSet, run_job
+from ig2mj.process.spawning import worker_processes
 
 
 class ThisProcess:
@@ -64,7 +62,7 @@ class LocalProcesses:
     def submit(self, job: Job) -> None:
         """Sends a job to a free process, or to a new one."""
         process = self._free.pop() if self._free else self._new()
-        # A process that starts here inherits this: Ctrl-C would have it print a traceback until `_begin` has run.
+        # A process that starts here inherits this: Ctrl-C would have it print a traceback until it is set up.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self._busy[process.submit(_do_here, self._job_set.function, job)] = (job, process)
@@ -72,10 +70,7 @@ class LocalProcesses:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def _new(self) -> concurrent.futures.ProcessPoolExecutor:
-        context = multiprocessing.get_context("spawn")  # a forked process that has threads can hang
-        return concurrent.futures.ProcessPoolExecutor(
-            1, context, initializer=_begin, initargs=(dict(self._job_set.shared), self._job_set.gpu)
-        )
+        return worker_processes(1, gpu=self._job_set.gpu, begin=_share, arguments=(dict(self._job_set.shared),))
 
     def wait(self) -> list[JobResult]:
         """Waits for at least one result."""
@@ -104,23 +99,9 @@ _shared: dict[str, bytes] = {}
 """`JobSet.shared`, in a worker process."""
 
 
-def _begin(shared: Mapping[str, bytes], gpu: bool) -> None:
-    """Set-up of a worker process. Ctrl-C reaches every process of the terminal; only the parent handles it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+def _share(shared: Mapping[str, bytes]) -> None:
+    """Set-up of a worker process."""
     _shared.update(shared)
-    if not gpu:
-        from ig2mj.process import use_processor_only
-
-        use_processor_only()  # many processes would fill a GPU's memory
-
-
-def _end_with_parent() -> None:
-    """Exits when the parent process ends for any reason."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        multiprocessing.connection.wait([parent.sentinel])
-        os._exit(1)
 
 
 def _do_here(function: str, job: Job) -> JobResult:

@@ -11,7 +11,6 @@ import concurrent.futures
 import contextlib
 import hashlib
 import json
-import multiprocessing
 import os
 import pathlib
 import re
@@ -27,9 +26,9 @@ from jaxtyping import Bool
 from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.registry import make_engine
 from ig2mj.errors import EngineError, InputError, UnknownNameError
-from ig2mj.process import entry_point, use_processor_only
+from ig2mj.process import entry_point
 from ig2mj.process.progress import progress as shown
-from ig2mj.process.spawning import processes_for
+from ig2mj.process.spawning import processes_for, worker_processes
 from ig2mj.sampling.many import sample
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.custom.code import NOTEBOOK
@@ -221,8 +220,7 @@ def _pool(
 
 def sampling_processes(jobs: int) -> concurrent.futures.Executor:
     """Processes that sample parts of pools; 0: one per processor. Close it, or use it in a `with`."""
-    context = multiprocessing.get_context("spawn")  # forking a process that has threads can hang
-    return concurrent.futures.ProcessPoolExecutor(jobs or os.cpu_count(), context, initializer=use_processor_only)
+    return worker_processes(jobs or os.cpu_count() or 1, ctrl_c=True)
 
 
 def limit_of(requested: int) -> int:
