@@ -3,11 +3,16 @@
     python -m benchmarks.planning.activities --rung symbolic --starts 100 --jobs 64 --out rows
     python -m benchmarks.planning.activities --rung physics --starts 100 --jobs 64 --out rows
     python -m benchmarks.planning.activities --rung physics --starts 10 --activities making_tea --out rows
+    python -m benchmarks.planning.activities --rung physics --starts 10 --agent random --out rows
+    python -m benchmarks.planning.activities --rung physics --starts 10 --doors shut --out rows
+    python -m benchmarks.planning.activities --rung physics --starts 10 --home other --out rows
+    python -m benchmarks.planning.activities --rung physics --starts 10 --grasping physical --out rows
+    python -m benchmarks.planning.activities --rung physics --starts 10 --moved once --out rows
 
 Rows are appended to OUT/<rung>.jsonl, each as soon as it is there. A run that was interrupted continues where it ended;
-rows of other conditions (split, seed, robot, doors) stay. Start states are sampled first, each activity by one process,
-and kept in ig2mj's cache. Each process computes with one thread. A process that crashes, or is silent for `--silence`
-seconds, leaves a row that says so for the start that it was at, and the others go on.
+rows of other conditions (split, seed, robot, doors, agent, home, grasping, moved) stay. Start states are sampled first,
+each activity by one process, and kept in ig2mj's cache. Each process computes with one thread. A process that crashes,
+or is silent for `--silence` seconds, leaves a row that says so for the start that it was at, and the others go on.
 `python -m benchmarks.planning.page` makes the page from the rows.
 """
 
@@ -28,6 +33,7 @@ from typing import Any
 
 from benchmarks.harness.paths import ROOT, module
 from benchmarks.harness.results import provenance
+from benchmarks.planning.worker import DEFAULTS, add_conditions
 from benchmarks.sampling.behavior_goals import RESULTS, sampled_homes
 from ig2mj.cluster.reporting import ProcessEnded, reports
 from ig2mj.cluster.versions import versions
@@ -57,6 +63,7 @@ def main() -> None:
     parser.add_argument("--robot", default="humanoid")
     parser.add_argument("--split", default="held_out")
     parser.add_argument("--doors", choices=("open", "shut"), default="open")
+    add_conditions(parser)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=1800.0, help="wall time of an episode")
     parser.add_argument("--silence", type=float, default=900.0, help="seconds without a step that end a process")
@@ -89,6 +96,8 @@ class _Run:
         self.logs = args.out / "logs"
         self.logs.mkdir(exist_ok=True)
         self.conditions = {name: getattr(args, name) for name in CONDITIONS}
+        self.varied = {name: getattr(args, name) for name, usual in DEFAULTS.items() if getattr(args, name) != usual}
+        self.conditions |= self.varied
         self.stopped = threading.Event()
         self.began = time.monotonic()
         self.made_by = {**provenance(), "versions": versions()}
@@ -181,7 +190,7 @@ class _Run:
     def told(self, job: _Job, *arguments: str) -> Iterable[Row]:
         """What a process reports."""
         args = self.args
-        options = [f"--{name}={getattr(args, name)}" for name in CONDITIONS]
+        options = [f"--{name}={value}" for name, value in self.conditions.items()]
         command = [sys.executable, *module("planning.worker"), job.activity, "--child", *options]
         log = self.logs / f"{job.activity}.{args.rung}.txt"
         for told in reports([*command, f"--seconds={args.seconds}", *arguments], lambda: args.silence, log, cwd=ROOT):

@@ -13,6 +13,8 @@ import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 
+from benchmarks.planning.baselines import AGENTS, planner_of, settings_of
+from benchmarks.planning.moving import SomebodyElse
 from ig2mj.agents.registry import make_robot
 from ig2mj.cluster.reporting import end_with_parent, report
 from ig2mj.demos.solving import Episodes
@@ -25,6 +27,16 @@ from ig2mj.planning.results import row_of
 from ig2mj.planning.solver import EpisodeResult, StepRecord, solve
 from ig2mj.planning.symbolic import symbolic_episodes
 from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
+from ig2mj.scene.manifest import load_manifest
+from ig2mj.scene.paths import scene_folder, shipped_homes
+from ig2mj.tasks.bddl.definitions import load_activity
+from ig2mj.tasks.bddl.start import fitting
+from ig2mj.tasks.bddl.task import bddl_task
+
+DEFAULTS = {"agent": "planner", "home": "", "grasping": "assisted", "moved": "none"}
+"""Conditions that a row holds only where they differ from these."""
+
+MOVED = "once: in the middle of the plan somebody else moves an object that is still needed"
 
 SAMPLED_TOGETHER = 10
 """Start states that are kept on disk together while they are sampled."""
@@ -41,16 +53,37 @@ def main() -> None:
     parser.add_argument("--doors", choices=("open", "shut"), default="open")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=float("inf"), help="wall time of an episode")
+    add_conditions(parser)
     parser.add_argument("--child", action="store_true", help="end with the process that started this one")
     args = parser.parse_args()
     if args.child:
         end_with_parent()
     warnings.simplefilter("ignore")
-    problem = problem_of(args.activity)
+    problem = problem_of(args.activity, home=home_of(args.activity, args.home))
     if not args.starts:
         sample(problem, args.split, args.count)
         return
     solve_starts(problem, args)
+
+
+def add_conditions(parser: argparse.ArgumentParser) -> None:
+    """Conditions in which rows may differ from the main ones (`DEFAULTS`)."""
+    parser.add_argument("--agent", choices=AGENTS, default=DEFAULTS["agent"], help="what chooses and plans primitives")
+    parser.add_argument("--home", default=DEFAULTS["home"], help="a home, or other: another that it fits")
+    parser.add_argument("--grasping", choices=("assisted", "physical", "sticky"), default=DEFAULTS["grasping"])
+    parser.add_argument("--moved", choices=("none", "once"), default=DEFAULTS["moved"], help=MOVED)
+
+
+def home_of(activity: str, home: str) -> str | None:
+    """The home of a row; None: the activity's own. Raises Ig2mjError: the activity fits in no other."""
+    if home != "other":
+        return home or None
+    own = bddl_task(activity).home
+    bound, _ = fitting(load_activity(activity), [load_manifest(scene_folder(name)) for name in shipped_homes()])
+    others = [b.home for b in bound if b.home != own]
+    if not others:
+        raise Ig2mjError(f"{activity} fits in no other home")
+    return others[0]
 
 
 def sample(problem: Problem, split: str, count: int) -> None:
@@ -66,15 +99,17 @@ def sample(problem: Problem, split: str, count: int) -> None:
 def solve_starts(problem: Problem, args: argparse.Namespace) -> None:
     """Solves the starts one after another. An error of one is its result."""
     planner = TaskPlanner(Domain(problem.model, make_robot(args.robot).hand_count), problem.goal)
+    planner = planner_of(args.agent, planner, problem, args.seed)
     left = list(args.starts)
     while left:
         began = time.process_time()
         try:
-            for number, result in episodes(problem, planner, tuple(left), args):
-                left.remove(number)
-                spent = round(time.process_time() - began, 2)
-                report(event="row", start=number, home=problem.scene.name, processor=spent, result=row_of(result))
-                began = time.process_time()
+            with settings_of(args.agent):
+                for number, result in episodes(problem, planner, tuple(left), args):
+                    left.remove(number)
+                    spent = round(time.process_time() - began, 2)
+                    report(event="row", start=number, home=problem.scene.name, processor=spent, result=row_of(result))
+                    began = time.process_time()
             return  # starts that are left have no row of the pool
         except (Exception, MemoryError) as e:
             why = " ".join(str(e).split()) if isinstance(e, Ig2mjError) else f"{type(e).__name__}: {e}"
@@ -88,8 +123,12 @@ def episodes(
     """Solves starts; their numbers and results."""
     at = numbers[0]
 
+    somebody: SomebodyElse | None = None
+
     def watch(world: int, plan: TaskPlan, records: Sequence[StepRecord]) -> None:
         report(event="step", start=at, step=str(plan.steps[0]) if plan.steps else "")
+        if somebody is not None and (moved := somebody.see(plan, records)):
+            report(event="step", start=at, step=moved)
 
     if args.rung == "symbolic":
         pool = problem.pool(args.split, max(args.count, max(numbers) + 1))
@@ -106,11 +145,13 @@ def episodes(
         return
 
     def begun(numbers: Sequence[int], rung: PhysicsRung) -> None:
-        nonlocal at
+        nonlocal at, somebody
         at = numbers[0]
+        somebody = SomebodyElse(found.stage, rung, args.seed) if args.moved == "once" else None
         report(event="begin", start=at)
 
     options = {"robot": args.robot, "split": args.split, "seed": args.seed, "doors_open": args.doors == "open"}
+    options["grasping"] = args.grasping
     with Episodes(problem, planner, numbers, **options) as found:
         yield from found.solve(seconds=args.seconds, watch=watch, begun=begun)
 

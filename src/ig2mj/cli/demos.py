@@ -1,9 +1,10 @@
-"""`ig2mj demos`: record demonstrations of scripted experts; replay, export, measure and convert recordings."""
+"""`ig2mj demos`: record demonstrations of experts; replay, export, measure and convert recordings."""
 
 from __future__ import annotations
 
 import pathlib
-from typing import Annotated
+import sys
+from typing import Annotated, Literal
 
 import tyro
 
@@ -24,37 +25,44 @@ def collect(
     grasping: str | None = None,
     obs: str = "state",
     engine: str = "native",
-    worlds: int = 8,
-    noise: float = 0.1,
-    disturbed: float = 0.02,
+    worlds: int = 0,
+    noise: float | None = None,
+    disturbed: float | None = None,
     seed: int = 0,
     split: str = "train",
     pool_size: int = 0,
+    doors: Literal["open", "shut"] = "shut",
     object: AddedObjects = (),
     jobs: int = 1,
     cluster: Cluster = None,
     resume: Resume = False,
 ) -> int:
-    """Play a scripted expert and record its successful episodes, with its labels and observations.
+    """Play an expert and record its successful episodes, with its labels and observations.
+
+    The expert is scripted for the paper's activities, and the planner for activities of BEHAVIOR and for goals in a
+    home. Ctrl-C keeps the episodes that are done; --resume continues.
 
     `ig2mj train --demos` learns from the recording; `ig2mj demos replay`, `metrics`, `export` and `ig2mj web` read it.
 
     Args:
-      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them), or a task of a file of
-        yours: my_tasks.py:MugToTable.
+      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them), activity/NAME, a goal
+        ("goal/small_home (open fridge_0)"), or a task of a file of yours: my_tasks.py:MugToTable.
       out: output file.
       episodes: number of successful episodes to collect.
       robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first robot.
       grasping: mitten, assisted, sticky or physical; default: the task's.
       obs: observations to record: state, or rgbd for images as well. Others can be computed by a replay.
       engine: native, warp or jax.
-      worlds: number of worlds stepped at once.
-      noise: standard deviation of the noise added to the expert's actions; the labels stay noise-free.
-      disturbed: probability per step that five random steps begin, from which the expert recovers.
+      worlds: number of worlds stepped at once; default: 8, of the planner 1.
+      noise: standard deviation of the noise added to the expert's actions; the labels stay noise-free. Default: 0.1, of
+        the planner 0.05.
+      disturbed: probability per step that five random steps begin, from which the expert recovers. Default: 0.02, of
+        the planner 0.
       seed: random seed of start states and noise.
       split: which start states: train or held_out.
       pool_size: number of start states; 0: all of the split, or as many as episodes where they neither ship nor were
         sampled before.
+      doors: whether doors between rooms that the task does not name stand open at the start of episodes.
       object: {object}.
       jobs: number of processes, each with its own worlds.
       cluster: run on a Ray cluster: its address, or auto.
@@ -65,8 +73,10 @@ def collect(
     from ig2mj.cli.common.tasks import few_rows
     from ig2mj.cluster.job_runner import map_jobs
     from ig2mj.cluster.jobs import JobSet
-    from ig2mj.demos.collection import collection_jobs, join_recordings
+    from ig2mj.demos.collection import EPISODES_PER_JOB, collection_jobs, join_recordings
+    from ig2mj.demos.solving import horizon_for
     from ig2mj.envs.experts import expert_of
+    from ig2mj.envs.planned_expert import PlannedExpert
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.shared_starts import shared_pool
     from ig2mj.errors import Ig2mjError, UnknownNameError
@@ -75,9 +85,9 @@ def collect(
 
     if obs not in MODES:
         raise UnknownNameError("kind of observation", obs, MODES)
-    if episodes < 1 or worlds < 1:
+    if episodes < 1 or worlds < 0:
         raise Ig2mjError(f"--episodes {episodes}, --worlds {worlds}: at least one of each is needed")
-    if not 0 <= noise < float("inf") or not 0 <= disturbed <= 1:
+    if not 0 <= (noise or 0.0) < float("inf") or not 0 <= (disturbed or 0.0) <= 1:
         raise Ig2mjError(f"--noise {noise}, --disturbed {disturbed}: 0 or more, and between 0 and 1")
     if jobs < 0:
         raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
@@ -87,38 +97,52 @@ def collect(
     where = where_of(jobs, cluster, resume)
     pool_size = pool_size or few_rows(env, split, max(episodes, worlds), object, grasping)
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
+    count = pool_size or None
+    common = {"observations": VECTORS, "split": split, "pool_size": count, "objects": object, "doors": doors}
+    first = make(env, robot, 1, "native", grasping, **common)
+    note_changes(first.scene, object)
+    expert, horizon = expert_of(first), None  # errors before any work
+    planned = isinstance(expert, PlannedExpert)
+    if planned:
+        expert(first.reset(seed))  # a goal that cannot become true is refused here
+        horizon = max(first.task.horizon, horizon_for(expert.planned, first.period))
+    first.close()
+    usual = (1, 0.05, 0.0) if planned else (8, 0.1, 0.02)
     settings = {
         "env": env,
         "robot": robot,
         "grasping": grasping,
         "engine": engine,
-        "worlds": worlds,
+        "worlds": worlds or usual[0],
         "observations": list(names),
         "split": split,
         "pool_size": pool_size or None,
-        "noise": noise,
-        "disturbed": disturbed,
+        "noise": usual[1] if noise is None else noise,
+        "disturbed": usual[2] if disturbed is None else disturbed,
         **({"objects": list(object)} if object else {}),
+        **({"doors": doors} if doors != "shut" else {}),
+        **({"horizon": horizon} if planned else {}),
     }
-    count = pool_size or None
-    common = {"observations": VECTORS, "split": split, "pool_size": count, "objects": object}
-    first = make(env, robot, 1, "native", grasping, **common)
-    note_changes(first.scene, object)
-    expert_of(first)  # errors before any work
-    first.close()
     title = f"demonstrations of {env}"
     starts = {"task": env, "split": split, "count": count, **({"objects": list(object)} if object else {})}
     work = JobSet(
         "ig2mj.demos.collection:collect_job",
         title,
-        collection_jobs(settings, episodes, seed),
+        collection_jobs(settings, episodes, seed, 1 if planned else EPISODES_PER_JOB),
         shared_pool(**starts) if cluster is not None else {},
         ("ig2mj.envs.shared_starts:start_states", starts),
         gpu=engine != "native",
     )
     request = {"command": "demos collect", "episodes": episodes, "seed": seed, **settings}
     with opened(out, request, where) as journal, follow(title) as report:
-        store, failed = map_jobs(work, where, journal, report)
+        try:
+            store, failed = map_jobs(work, where, journal, report)
+        except KeyboardInterrupt:
+            done = [job.name for job in work.jobs if job.name in journal.names()]
+            kept = join_recordings((journal.get(name) for name in done), out)[0] if done else 0
+            words = f"{out} holds the {kept} episodes that are done" if kept else "no episode is done"
+            print(f"{words}; the same command with --resume continues", file=sys.stderr)
+            raise
         parts = (store.get(job.name) for job in work.jobs if job.name not in failed)
         kept, lost = join_recordings(parts, out) if len(failed) < len(work.jobs) else (0, 0)
         if not failed:

@@ -69,7 +69,8 @@ def run(
         what the file says.
       set: settings of the algorithm and of the run, e.g. utd_ratio=16 actor_layers=128,128 engine=native
         image_size=64; docs/guide/learning.md lists them.
-      algo: sac (the default), ppo, bc (from --demos alone), or dagger (a scripted expert labels what the policy does).
+      algo: sac (the default), ppo, bc (from --demos alone), or dagger (the task's expert, or the planner, labels what
+        the policy does).
       robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first robot.
       grasping: mitten (a hand holds what it touches first), assisted, sticky or physical; default: the task's.
       obs: state (the default: proprioception and privileged state) or rgbd (proprioception and images, as in the
@@ -80,7 +81,8 @@ def run(
       out: folder of the run; default: runs/ENV-ROBOT-GRASPING-ALGO-OBS-SEED.
       resume: continue from the newest checkpoint in the folder.
       devices: number of GPUs, or all: of this machine, or of all processes started together (docs/guide/scale.md).
-      demos: file of `ig2mj demos collect`: bc learns from it alone; sac starts as its clone and keeps replaying it.
+      demos: file of `ig2mj demos collect`: bc learns from it alone; sac and dagger start as its clone and keep
+        replaying it.
       init_from: for dagger: a policy's file, a run's folder or the name of a policy that ships, whose networks are
         trained further; --set object_memory=poses adds a memory that it did not have.
       stop_at_success: stop once this share of the last episodes succeeds, e.g. 0.98.
@@ -172,6 +174,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
                 sensors=SensorOptions(rows=rendered_rows(settings.rows, settings.image_size)),
                 objects=chosen.objects,
                 looks=settings.looks,
+                doors=settings.doors,
                 **settings.varied,
             )
             note_changes(world.scene, chosen.objects)
@@ -262,8 +265,10 @@ def _check(chosen: RunOptions, settings: RunSettings, out: pathlib.Path | None) 
         raise Ig2mjError("image_rows: only images have rows (--obs rgbd)")
     if devices != "all" and not (devices.isdigit() and int(devices)):
         raise Ig2mjError(f"--devices {devices}: a number from 1 on, or all")
-    if chosen.demos is not None and algo not in ("bc", "sac"):
-        raise Ig2mjError(f"--demos: {algo} takes none (bc and sac do)")
+    if chosen.demos is not None and algo == "ppo":
+        raise Ig2mjError(f"--demos: {algo} takes none (bc, dagger and sac do)")
+    if chosen.demos is not None and chosen.init_from is not None:
+        raise Ig2mjError("--demos, --init-from: dagger begins with one of them")
     if chosen.init_from is not None and algo != "dagger":
         raise Ig2mjError(f"--init-from is for --algo dagger, not {algo}: a policy's file holds no critics")
     if settings.expert and algo != "sac":

@@ -1,4 +1,6 @@
-"""Collects demonstrations: recordings of a scripted expert's successful episodes, with its labels and observations.
+"""Collects demonstrations: recordings of an expert's successful episodes, with its labels and observations.
+
+The expert is the scripted one of the task, or the planner (`ig2mj.envs.planned_expert`).
 
 A collection is divided into jobs (`ig2mj.cluster.job_runner`). Each plays some episodes from its own seed and returns a
 recording; `join_recordings` makes one of them.
@@ -7,6 +9,7 @@ recording; `join_recordings` makes one of them.
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import pathlib
 import tempfile
@@ -30,7 +33,7 @@ from ig2mj.process import entry_point
 from ig2mj.process.progress import progress as show_progress
 
 EPISODES_PER_JOB = 32
-"""Episodes of a job."""
+"""Episodes of a job; of the planner's, which take minutes, 1."""
 
 DISTURBED_STEPS = 5
 """Steps of one random action that a disturbance lasts."""
@@ -115,18 +118,23 @@ def _play(
         failed += int((done & ~success).sum())
         if failed >= HOPELESS and kept * 10 < failed:
             raise Ig2mjError(f"the expert failed in {failed} of {failed + kept} episodes")
-        left[done] = step[done] = 0
+        lost = np.asarray(getattr(expert, "given_up", done & ~done)) & ~done
+        if lost.any():  # the planner has no plan left: the rest of the episode would be of no use
+            failed += int(lost.sum())
+            state = env.reset(state, lost)
+        left[done | lost] = step[done | lost] = 0
         text = f"{min(kept, episodes)} of {episodes} successful episodes, {failed} failed, step {step.max()}"
         progress(min(kept, episodes), episodes, text)
     return failed
 
 
-def collection_jobs(settings: Mapping[str, Any], episodes: int, seed: int) -> list[Job]:
-    """Jobs of a collection. `settings`: the arguments of `collect_job` but `episodes`, `seed` and `shared`."""
+def collection_jobs(settings: Mapping[str, Any], episodes: int, seed: int, each: int = EPISODES_PER_JOB) -> list[Job]:
+    """Jobs of a collection. `settings`: the arguments of `collect_job` but `episodes`, `seed` and `shared`. `each`:
+    episodes of a job."""
     found = []
-    for number, first in enumerate(range(0, episodes, EPISODES_PER_JOB)):
+    for number, first in enumerate(range(0, episodes, each)):
         own = seed if number == 0 else int(np.random.SeedSequence([seed, number]).generate_state(1)[0] >> 1)
-        arguments = {**settings, "episodes": min(EPISODES_PER_JOB, episodes - first), "seed": own}
+        arguments = {**settings, "episodes": min(each, episodes - first), "seed": own}
         found.append(Job(f"episodes_{first:07d}", arguments))
     return found
 
@@ -146,6 +154,8 @@ def collect_job(
     seed: int,
     shared: Mapping[str, bytes] | None = None,
     objects: Sequence[str] = (),
+    doors: str = "shut",
+    horizon: int | None = None,
 ) -> bytes:
     """The bytes of a recording. Arguments: of `ig2mj.make` and of `collect`.
 
@@ -154,8 +164,9 @@ def collect_job(
     """
     try:
         keep_pool(shared or {}, env, split, pool_size, objects)
-        starts: dict[str, Any] = {"split": split, "pool_size": pool_size, "objects": objects}
-        played = make(env, robot, worlds, engine, grasping, observations=observations, **starts)
+        starts: dict[str, Any] = {"split": split, "pool_size": pool_size, "objects": tuple(objects)}
+        starts |= {"doors": doors, "horizon": horizon}
+        played = _environment(env, robot, worlds, engine, grasping, tuple(observations), **starts)
     except Ig2mjError as e:
         raise WholeRunError(e) from e
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
@@ -163,8 +174,14 @@ def collect_job(
         with show_progress(f"the expert plays {env}") as report:
             options: dict[str, Any] = {"seed": seed, "noise": noise, "disturbed": disturbed, "progress": report}
             collect(played, expert_of(played), file, episodes, **options)
-        played.close()
         return file.read_bytes()
+
+
+@functools.lru_cache(maxsize=1)
+def _environment(*arguments: Any, **options: Any) -> Environment:
+    """The environment of all jobs, made once in each process. `arguments`: of `make`, observations last."""
+    *common, observations = arguments
+    return make(*common, observations=observations, **options)
 
 
 def join_recordings(parts: Iterable[bytes], file: pathlib.Path) -> tuple[int, int]:

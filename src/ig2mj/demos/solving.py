@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.demos.environments import RecordedEnvironment, record
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.planning_stage import EnvironmentStage, problem_env
@@ -37,6 +38,11 @@ SECONDS_PER_STEP, SECONDS_MORE = 60.0, 100.0
 
 PLAN = "plan"
 """Attribute of a run: what was done, as JSON (`ig2mj.planning.results.row_of`), and the `number` of the episode."""
+
+
+def horizon_for(steps: int, period: float = ACTION_PERIOD) -> int:
+    """Agent steps that an episode with a plan of so many steps may take. `period`: s of one."""
+    return math.ceil((SECONDS_PER_STEP * steps + SECONDS_MORE) / period)
 
 
 @entry_point
@@ -59,12 +65,14 @@ class Episodes:
         split: str = "held_out",
         seed: int = 0,
         doors_open: bool = True,
+        grasping: str = "assisted",
         record: str | os.PathLike | None = None,
     ):
         """
         Args:
           robot: which robot acts. worlds: episodes that are solved side by side. split: of the start states.
-          seed: of what is sampled. doors_open: doors between rooms that the problem does not name stand open.
+          grasping: how hands hold (`ig2mj.make`). seed: of what is sampled.
+          doors_open: doors between rooms that the problem does not name stand open.
           record: HDF5 file of a recording, replaced if it is there.
 
         Raises:
@@ -84,6 +92,7 @@ class Episodes:
         self.numbers = [n for n in numbers if problem.own_goal or n < self._size(split, rows)]
         worlds = max(1, min(worlds, len(self.numbers)))
         options: dict[str, Any] = {"rows": rows, "split": split, "horizon": self._horizon(split, rows)}
+        options["grasping"] = grasping
         self.env: Environment = problem_env(problem, robot, worlds, **options)
         self._step = self.env.step
         if record is not None:
@@ -101,7 +110,7 @@ class Episodes:
         numbers = self.numbers[:1] if pool is None else self.numbers
         for _, rung in symbolic_episodes(self.planner.domain, self.problem.scene, pool, numbers):
             longest = max(longest, len(self.planner.plan(rung.facts(0)).steps))
-        return math.ceil((SECONDS_PER_STEP * longest + SECONDS_MORE) / 0.1)
+        return horizon_for(longest)
 
     def solve(
         self,

@@ -82,6 +82,7 @@ class Overrides(EngineOptions, total=False):
     split: str
     pool_size: int | None
     augment_starts: int
+    doors: str
     image_size: int | None
     looks: str | None
     sensors: SensorOptions | Mapping[str, Any] | None
@@ -145,6 +146,8 @@ class EnvConfig:
         (`ig2mj sample-task`); navigation makes its own each time.
       augment_starts: number of start states made from those (`ig2mj.tasks.mixing`): each object lies as in one of
         them, turned as in another. 0: none, start states are used as they are.
+      doors: whether doors between rooms that the task does not name stand "open" at the start of episodes, or "shut",
+        as homes have them.
       image_size: height and width of images in pixels; None: those of `sensors`.
       looks: how the robot's cameras see the home: "day", "night" or "plain" (`ig2mj.load_scene`); None: as `sensors`
         says, which is plain.
@@ -179,6 +182,7 @@ class EnvConfig:
     split: str = "train"
     pool_size: int | None = None
     augment_starts: int = 0
+    doors: str = "shut"
     image_size: int | None = None
     looks: str | None = None
     sensors: SensorOptions = dataclasses.field(default_factory=SensorOptions)

@@ -1,9 +1,10 @@
-"""`expert_of`: the scripted expert of an environment.
+"""`expert_of`: the expert of an environment, a scripted one or the planner.
 
     expert = expert_of(env)
     state = env.step(state, expert(state))
 
-Pure: it may be part of a compiled program, and asked in any state (`ig2mj.tasks.experts`).
+A scripted expert is pure: it may be part of a compiled program, and asked in any state (`ig2mj.tasks.experts`). The
+planner (`ig2mj.envs.planned_expert`) has a memory, and is shown every state in turn.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from jaxtyping import Float
 
 from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
+from ig2mj.envs.planned_expert import PlannedExpert, is_planned
 from ig2mj.errors import UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
@@ -25,6 +27,11 @@ from ig2mj.tasks.experts import Expert
 from ig2mj.tasks.experts.sight import Belief
 from ig2mj.tasks.model_choices import VariedObjective
 from ig2mj.tasks.task import Task
+
+
+def has_script(env: Environment) -> bool:
+    """Whether a scripted expert does an environment's task."""
+    return isinstance(env.task, Task) and env.task.expert is not None
 
 
 def make_expert(env: Environment) -> Expert:
@@ -62,11 +69,15 @@ class VariedExpert(Expert):
 @entry_point
 def expert_of(env: Environment) -> Callable[..., Float[Array, "W n"]]:
     """What acts in all worlds of an environment, compiled: from a state, and where it takes objects to be, as
-    `ig2mj.tasks.experts.Expert` does, to actions.
+    `ig2mj.tasks.experts.Expert` does, to actions. Of an activity of BEHAVIOR, and of a goal in a home, it is the
+    planner (`PlannedExpert`), on the host.
 
     Raises:
-      UnknownNameError: the task has no expert. EngineError: the robot lacks hands that tasks move.
+      UnknownNameError: the task has no expert. EngineError: the robot lacks hands that tasks move. PlanningError:
+      motion of the robot cannot be planned.
     """
+    if not has_script(env) and is_planned(env):
+        return PlannedExpert(env)
     expert = make_expert(env)
 
     def expert_fn(view: Any, states: Any, beliefs: Any) -> Any:

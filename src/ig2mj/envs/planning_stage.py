@@ -5,6 +5,7 @@ Axes: W worlds, n numbers of the task's action, m of the robot's.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Collection, Sequence
 
@@ -13,6 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ig2mj.agents.base import Controller
+from ig2mj.engine.base import Write
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.envs.environment import Environment, EnvState
@@ -106,6 +108,10 @@ class EnvironmentStage:
             state = self.env.resume(state.batch, rows)
         self._state = state
 
+    def write(self, write: Write) -> None:
+        """Changes physics of the worlds between two steps, as somebody else may; `write` has a row for each world."""
+        self._state = dataclasses.replace(self.state, batch=self.env.core.write(self.state.batch, write))
+
     def act(self, action: Float[np.ndarray, "W m"]) -> None:
         """See `Stage.act`."""
         own = self.env.action_map
@@ -129,8 +135,10 @@ def problem_env(
     rows: int = 1,
     split: str = "held_out",
     horizon: int | None = None,
+    grasping: str = "assisted",
+    engine: str = "native",
 ) -> Environment:
-    """The environment of a planning problem on the native engine, whose actions move all of the robot.
+    """The environment of a planning problem, whose actions move all of the robot.
 
     Args:
       rows: start states of the split that it has, if as many can be sampled. horizon: agent steps; None: the task's.
@@ -143,8 +151,8 @@ def problem_env(
         problem.task,
         robot=robot,
         worlds=worlds,
-        engine="native",
-        grasping="assisted",
+        engine=engine,
+        grasping=grasping,
         whole_actions=True,
         split=split,
         pool_size=1 if problem.own_goal else rows,

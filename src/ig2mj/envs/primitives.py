@@ -14,7 +14,7 @@ Axes: F facts.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -26,10 +26,11 @@ from ig2mj.envs.planning_stage import EnvironmentStage, problem_env
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
+from ig2mj.planning.grounding import ground_steps, named_things
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.problem import Problem, problem_of
 from ig2mj.planning.rung import Rung
-from ig2mj.planning.steps import PRIMITIVES, PlanningError, Step, make_step
+from ig2mj.planning.steps import PlanningError, Step, make_step
 from ig2mj.planning.symbolic import symbolic_episodes
 from ig2mj.planning.words import step_of
 from ig2mj.predicates.explain import value_of
@@ -38,7 +39,6 @@ from ig2mj.predicates.quality import quality
 from ig2mj.process import entry_point
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.tasks.own_goal import split_goal_name
-from ig2mj.tasks.task import GROUND
 
 HORIZON = 60
 """Primitives of an episode: the longest plans of BEHAVIOR-100 have 53."""
@@ -97,10 +97,10 @@ class PrimitiveEnv(gymnasium.Env):
         if rung == "physics":
             self._stage = EnvironmentStage(problem_env(self.problem, robot, rows=self._size, split=split), ends=False)
             self._query = SceneQuery(self._stage.scene)
-        things = self._things()
-        self.actions: tuple[Step, ...] = tuple(self._ground(things))
+        things = self._things = named_things(self.domain, self.problem)
+        self.actions: tuple[Step, ...] = tuple(ground_steps(self.domain, self.problem))
         self._atoms = self._observed(things)
-        held = [f"(held {n})" for n in things if self._loose(n)]
+        held = [f"(held {n})" for n in things if not self.domain.fixed(n)]
         self.fact_names: tuple[str, ...] = (*(f"({' '.join((a.predicate, *a.arguments))})" for a in self._atoms), *held)
         self.action_space = gymnasium.spaces.Discrete(len(self.actions))
         self.observation_space = gymnasium.spaces.MultiBinary(len(self.fact_names))
@@ -108,63 +108,7 @@ class PrimitiveEnv(gymnasium.Env):
         self._start: dict[Atom, bool] = {}
         self._count, self._q = 0, 0.0
 
-    # What can be done, and what is seen.
-
-    def _loose(self, name: str) -> bool:
-        return not self.domain.fixed(name)
-
-    def _things(self) -> list[str]:
-        """Objects that actions name."""
-        domain, rooms = self.domain, self.problem.model.tables.room_names
-        names = [n for n in self.problem.named if n not in rooms and self._category(n) not in GROUND]
-        sources = [s.name for s in domain.sources]
-        return list(dict.fromkeys([*names, *domain.tools, *domain.knives, *domain.taps, *sources]))
-
-    def _is_shell(self, name: str) -> bool:
-        """A part of the house rather than a thing in it."""
-        return self._category(name) in (*GROUND, "door", "window")
-
-    def _category(self, name: str) -> str:
-        return self.problem.model.tables.object_categories[self.domain.index(name)]
-
-    def _ground(self, things: Sequence[str]) -> Iterator[Step]:
-        """The discrete actions."""
-        domain, tables = self.domain, self.problem.model.tables
-        loose = [n for n in things if self._loose(n)]
-        rooms = [n for n in tables.room_names if n in self.problem.named] or list(tables.room_names)
-        opens = [n for n in domain.openable if n in things or not self._is_shell(n)]
-        able = {
-            "navigate_to": things,
-            "grasp": loose,
-            "release": loose,
-            "open": opens,
-            "close": opens,
-            "toggle_on": [n for n in things if domain.has(n, "toggleable")],
-            "toggle_off": [n for n in things if domain.has(n, "toggleable")],
-            "wipe": [n for n in things if domain.has(n, "dustyable")],
-            "scrub": [n for n in things if domain.has(n, "stainable")],
-            "soak": [n for n in loose if domain.has(n, "soakable")],
-            "slice": [n for n in things if domain.has(n, "sliceable")],
-            "cook": [n for n in loose if domain.has(n, "cookable")],
-            "freeze": [n for n in loose if domain.has(n, "freezable")],
-        }
-        second = {
-            "place_on_floor": rooms,
-            "wipe": domain.tools,
-            "scrub": [t for t in domain.tools if domain.has(t, "soakable")],
-            "soak": domain.taps,
-            "slice": domain.knives,
-        }
-        for primitive, kind in PRIMITIVES.items():
-            first = able.get(primitive, loose)
-            if len(kind.arguments) == 1:
-                yield from (make_step(primitive, (n,)) for n in first)
-                continue
-            for name in first:
-                others = second.get(primitive, things)
-                if primitive in ("cook", "freeze"):
-                    others = [s.name for s in (domain.heaters if primitive == "cook" else domain.coolers)(name)]
-                yield from (make_step(primitive, (name, other)) for other in others if other != name)
+    # What is seen.
 
     def _observed(self, things: Sequence[str]) -> tuple[Atom, ...]:
         """Atoms of the goal, then states of the things."""
@@ -179,7 +123,7 @@ class PrimitiveEnv(gymnasium.Env):
 
     def _observation(self, facts: Facts) -> Int8[np.ndarray, "F"]:
         truth = facts.truth(self._atoms)
-        held = [n in facts.held for n in self._things() if self._loose(n)]
+        held = [n in facts.held for n in self._things if not self.domain.fixed(n)]
         return np.array([*(truth[a] for a in self._atoms), *held], np.int8)
 
     # Gymnasium.

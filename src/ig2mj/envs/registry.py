@@ -31,7 +31,7 @@ from ig2mj.envs.names import NAMES, activity_name, short_name, unknown_environme
 from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, EnvSetup, setup_activity, setup_bddl, setup_navigation
 from ig2mj.envs.several_homes import HomesEnvironment, requested_homes
-from ig2mj.envs.start_choices import augmented, start_part, varied_models
+from ig2mj.envs.start_choices import DOORS, augmented, named_objects, start_part, varied_models, with_open_doors
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.sensors.registry import SENSORS
@@ -267,6 +267,8 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     whole_number("augment_starts", config.augment_starts, least=0)
     if config.augment_starts and not isinstance(task, Task):
         raise EngineError(f"augment_starts for {task.name}: only start states of the paper's activities are augmented")
+    if config.doors not in DOORS:
+        raise UnknownNameError("setting of doors", config.doors, DOORS)
     engine = choose_engine(config.engine)
     check_options(f"make with the {engine} engine", config.engine_options, engine, EnvConfig)
     task = dataclasses.replace(task, horizon=_horizon(task, config))
@@ -295,6 +297,8 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     rows = starts.size
     if config.augment_starts and isinstance(task, Task):
         starts = augmented(task, setup, starts, config.augment_starts)
+    if config.doors == "open":
+        starts = with_open_doors(scene, starts, named_objects(task))
     options = config.engine_options
     if differs is not None:
         options = {**options, "model_fields": (*options.get("model_fields", ()), *differs.model_fields)}

@@ -1,9 +1,18 @@
-"""What start states of an environment are taken from: parts of a split, models that differ, augmented rows."""
+"""What start states of an environment are taken from: parts of a split, other models, augmented rows, open doors."""
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Collection
+
+import numpy as np
+
+from ig2mj.engine.snapshot import FULLY_AWAKE
 from ig2mj.envs.setups import EnvSetup
 from ig2mj.errors import EngineError
+from ig2mj.planning.starts import open_doors
+from ig2mj.scene.scene import Scene
+from ig2mj.tasks.bddl.task import BddlTask
 from ig2mj.tasks.homes import AnyTask
 from ig2mj.tasks.mixing import mixed_pool
 from ig2mj.tasks.model_choices import ModelChoices, choices_of
@@ -18,6 +27,36 @@ def augmented(task: Task, setup: EnvSetup, starts: Pool, count: int) -> Pool:
     if setup.swaps is not None:
         raise EngineError("augment_starts and randomize: objects: augmented start states have the usual models only")
     return mixed_pool(task, setup.scene, starts, count)
+
+
+DOORS = ("shut", "open")
+"""Settings of `ig2mj.make(doors=...)`."""
+
+
+def named_objects(task: AnyTask) -> tuple[str, ...]:
+    """Objects and rooms that a task names."""
+    if isinstance(task, BddlTask):
+        return tuple(task.binding.objects.values())
+    return task.objects_of_interest if isinstance(task, Task) else ()
+
+
+def with_open_doors(scene: Scene, starts: Pool, named: Collection[str]) -> Pool:
+    """Start states in which doors between rooms stand wide open, but for some objects.
+
+    Args:
+      scene: of the environment, with its robots. named: objects that the task names.
+    """
+    write = open_doors(scene, named)
+    if write is None or write.qpos is None:
+        return starts
+    mask, values = np.asarray(write.qpos_mask)[0], np.asarray(write.qpos)[0]
+    count = np.shape(starts.physics.scene.qpos)[-1]  # robots come after everything else
+    opened = np.where(mask[:count], values[:count], np.asarray(starts.physics.scene.qpos))
+    asleep = np.full_like(np.asarray(starts.physics.scene.tree_asleep), FULLY_AWAKE)
+    part = dataclasses.replace(
+        starts.physics.scene, qpos=opened.astype(starts.physics.scene.qpos.dtype), tree_asleep=asleep
+    )
+    return dataclasses.replace(starts, physics=dataclasses.replace(starts.physics, scene=part))
 
 
 def start_part(split: str) -> str:

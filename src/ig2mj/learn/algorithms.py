@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ig2mj.envs.experts import expert_of
+from ig2mj.envs.planned_expert import PlannedExpert
 from ig2mj.errors import Ig2mjError, UnknownNameError
 from ig2mj.learn import networks
 from ig2mj.learn.collect import horizon_of
@@ -99,7 +100,7 @@ def make_algorithm(
     """The algorithm of these settings for an environment.
 
     Args:
-      env: an `ig2mj.envs.environment.Environment`. demos: for SAC. axis: of several devices.
+      env: an `ig2mj.envs.environment.Environment`. demos: for SAC and DAgger. axis: of several devices.
       expert: the task's expert helps SAC; DAgger always has it. occlusion: for DAgger.
 
     Raises:
@@ -119,6 +120,11 @@ def make_algorithm(
     if isinstance(config, PPOConfig):
         return PPO(perception, size, config, axis)
     helper, unlabelled, memory, o = expert_of(env), None, None, occlusion
+    if isinstance(helper, PlannedExpert):
+        if env.pure:
+            raise Ig2mjError("the planner is no part of a compiled program (--set engine=native)")
+        if o != NO_OCCLUSION:
+            raise Ig2mjError("settings of occlusion are for scripted experts, not for the planner")
     adviser: Any = helper
     if o.object_memory != "none":
         readings = getattr(env.core.controllers[0], "hand_readings", ())
@@ -127,4 +133,5 @@ def make_algorithm(
             adviser = BeliefAdviser(helper, memory, perception.targets)
     if o.pretrain_images:
         unlabelled = start_images(env, perception, o.pretrain_images, helper, o.pretrain_expert_steps)
-    return Dagger(perception, size, adviser, config, axis, unlabelled, horizon=horizon, encoder=encoder, memory=memory)
+    parts: dict[str, Any] = {"horizon": horizon, "encoder": encoder, "memory": memory, "demos": demos}
+    return Dagger(perception, size, adviser, config, axis, unlabelled, **parts)

@@ -192,6 +192,7 @@ def begin_as_clone(algorithm: Any, demos: Demos, seed: int, updates: int = 2000)
         image_shift=c.image_shift,
         actor_layers=c.actor_layers,
         encoder=c.encoder,
+        action_bins=getattr(c, "action_bins", 0),
     )
     cloner = BC(algorithm.perception, algorithm.action_size, config)
     learner, _ = clone(cloner, demos, Run(minutes=60.0, seed=seed, quiet=True))

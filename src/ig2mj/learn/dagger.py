@@ -26,6 +26,7 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.action_distributions import mode
 from ig2mj.learn.collect import GUIDED, Advice, Transition, if_ready
+from ig2mj.learn.demos import Demos
 from ig2mj.learn.guidance import UNAIDED, uncounted
 from ig2mj.learn.imitation import Imitation
 from ig2mj.learn.imitation_buffer import ImitationBuffer
@@ -138,10 +139,12 @@ class Dagger:
         horizon: int = 0,
         encoder: Encoder | None = None,
         memory: Memory | None = None,
+        demos: Demos | None = None,
     ):
         """
         Args:
           adviser: gives the labels. axis: the name of an axis of devices over which gradients are averaged.
+          demos: labelled steps, of which half of the samples of an update are taken.
           unlabelled: samples, on the host, from which the prediction learns as well: half as many again in each update.
           horizon: agent steps of an episode; success counts once so many have passed without the expert.
           encoder: of images; None: as `config` names it. memory: what the actor remembers; None: nothing.
@@ -152,7 +155,10 @@ class Dagger:
         """
         self.perception, self.action_size, self.axis = perception, action_size, axis
         self.adviser, self.unlabelled, self._horizon = as_adviser(adviser), unlabelled, horizon
+        self.demos = demos
         self.config = c = config or DaggerConfig()
+        if demos is not None and (memory is not None or axis is not None or unlabelled is not None):
+            raise Ig2mjError("--demos: for one device, without object_memory and pretrain_images")
         if unlabelled is not None and axis is not None:
             raise Ig2mjError("images of start states are for one device (--devices 1)")
         self.imitation = Imitation(perception, action_size, c, axis, encoder, memory)
@@ -201,7 +207,13 @@ class Dagger:
         """No labels yet."""
         rows = max(self.config.buffer_size // (num_worlds * self.length), 1) * self.length
         unlabelled, sizes = jax.tree.map(jnp.asarray, self.unlabelled), (self._remembered, self.kept_predictions)
-        return ImitationBuffer.empty(rows, num_worlds, self.perception, self.action_size, unlabelled, *sizes)
+        shown = None if self.demos is None else (self.demos.seen, self.demos.label)
+        shape = rows, num_worlds, self.perception, self.action_size
+        return ImitationBuffer.empty(*shape, unlabelled, *sizes, shown=jax.tree.map(jnp.array, shown))
+
+    def cloned(self, learner: DaggerLearner, actor: Any, moments: RunningStats) -> DaggerLearner:
+        """What begins with the actor of a clone, and the means that it was made with."""
+        return self.with_fresh_average(dataclasses.replace(learner, actor=actor, moments=moments))
 
     @property
     def kept_predictions(self) -> int:
@@ -286,7 +298,10 @@ class Dagger:
         def update(learner: DaggerLearner, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
             sample_key, augment_key, unlabelled_key, imageless_key = jax.random.split(key, 4)
             count = share_of(c.batch_size, self.axis)
-            seen, label, remembered = buffer.sample(sample_key, count)
+            if buffer.shown is None:
+                seen, label, remembered = buffer.sample(sample_key, count)
+            else:
+                seen, label, remembered = buffer.sample_with_shown(sample_key, count)
             if buffer.unlabelled is not None:
                 more = random_rows(buffer.unlabelled, unlabelled_key, count // 2)
                 seen = jax.tree.map(lambda *a: jnp.concatenate(a), seen, more)

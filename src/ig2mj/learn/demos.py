@@ -30,7 +30,7 @@ from ig2mj.files.limits import refuse_bomb
 from ig2mj.files.npz import refuse_nonfinite
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.perception import Perception, Seen, blank
-from ig2mj.learn.policies import looks_in
+from ig2mj.learn.policies import doors_in, looks_in
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import PLAIN
 from ig2mj.tasks.custom.code import IN_FILES
@@ -83,6 +83,7 @@ def _about(recording: Recording) -> tuple[dict[str, Any], dict[str, Space]]:
     world |= {name: recording.value(name, str) for name in IN_FILES if name in recording.header}
     sensors = recording.value("sensors", dict) if "sensors" in recording.header else {}
     world |= looks_in(spaces, str(sensors.get("looks", PLAIN)))
+    world |= doors_in(recording.value("made_with", dict) if "made_with" in recording.header else {})
     return {**world, "actions": recording.value("action_names", list), "privileged": privileged}, spaces
 
 

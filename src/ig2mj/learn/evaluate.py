@@ -103,6 +103,7 @@ def evaluate_job(
     shared: Mapping[str, bytes],
     objects: Sequence[str] = (),
     looks: str | None = None,
+    doors: str = "shut",
 ) -> bytes:
     """Episodes from the start states `first` on, as JSON: how each ended, what went wrong, and how long it took until
     the first step was taken ("start_seconds").
@@ -116,7 +117,7 @@ def evaluate_job(
     try:
         keep_pool(shared, task, split, pool_size, objects)
         made = (task, robot, grasping, engine, worlds, tuple(observations), paper_rl, split, pool_size)
-        env, actor = _player(shared["policy"], file, drawn, *made, tuple(objects), looks)
+        env, actor = _player(shared["policy"], file, drawn, *made, tuple(objects), looks, doors)
     except Ig2mjError as e:
         raise WholeRunError(e) from e
     with progress(f"playing {task} from start state {first}") as report:
@@ -144,6 +145,7 @@ def _player(
     pool_size: int | None,
     objects: tuple[str, ...],
     looks: str | None,
+    doors: str,
 ) -> tuple[Environment, Actor]:
     """The environment and its agent, the same in all jobs of an evaluation, so that they are compiled once.
 
@@ -157,6 +159,7 @@ def _player(
         "pool_size": pool_size,
         "objects": objects,
         "looks": looks,
+        "doors": doors,
     }
     env = make(task, robot, worlds, engine, grasping, **made)
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:

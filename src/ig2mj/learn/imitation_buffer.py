@@ -1,7 +1,7 @@
 """`ImitationBuffer`: what was seen in the last steps of all worlds, and what should have been done there.
 
-Axes: T steps, W worlds, B samples, n numbers of an action, v of a vector, q bytes of an image, m numbers that are
-remembered, g of a prediction.
+Axes: T steps, W worlds, B samples, D steps of demonstrations, n numbers of an action, v of a vector, q bytes of an
+image, m numbers that are remembered, g of a prediction.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ class ImitationBuffer:
       head: row that is written next. size: rows that are full.
       remembered: what the actor remembered (`protocols.Memory`). prediction: what it predicted as it acted.
       unlabelled: samples that have no labels; None: there are none.
+      shown: samples of demonstrations and their labels, which stay; None: there are none.
     """
 
     vector: Float[Array, "T W v"]
@@ -38,6 +39,7 @@ class ImitationBuffer:
     remembered: Float[Array, "T W m"]
     prediction: Float[Array, "T W g"]
     unlabelled: Seen | None = None
+    shown: tuple[Seen, Float[Array, "D n"]] | None = None
 
     @classmethod
     def empty(
@@ -49,6 +51,7 @@ class ImitationBuffer:
         unlabelled: Seen | None = None,
         remembered: int = 0,
         predictions: int = 0,
+        shown: tuple[Seen, Float[Array, "D n"]] | None = None,
     ) -> ImitationBuffer:
         """Room for so many steps of so many worlds.
 
@@ -64,6 +67,7 @@ class ImitationBuffer:
             remembered=jnp.zeros((steps, worlds, remembered)),
             prediction=jnp.zeros((steps, worlds, predictions)),
             unlabelled=unlabelled,
+            shown=shown,
         )
 
     def insert(
@@ -96,6 +100,17 @@ class ImitationBuffer:
         row, world = self._random(key, count)
         seen = Seen(self.vector[row, world], self.image[row, world])
         return seen, self.label[row, world], self.remembered[row, world]
+
+    def sample_with_shown(self, key: Array, count: int) -> tuple[Seen, Float[Array, "B n"], Float[Array, "B m"]]:
+        """As `sample`, half of it from the demonstrations, of which nothing is remembered."""
+        assert self.shown is not None
+        own_key, shown_key = jax.random.split(key)
+        seen, label, remembered = self.sample(own_key, count - count // 2)
+        shown, labels = self.shown
+        row = jax.random.randint(shown_key, (count // 2,), 0, labels.shape[0])
+        more = Seen(shown.vector[row], shown.image[row])
+        none = jnp.zeros((count // 2, remembered.shape[1]))
+        return jax.tree.map(lambda *a: jnp.concatenate(a), (seen, label, remembered), (more, labels[row], none))
 
     def sample_imageless(self, key: Array, count: int) -> ImagelessBatch:
         """So many steps without their images: vector, label, what was remembered, and the prediction."""

@@ -62,7 +62,13 @@ def world_of(env: Any) -> dict[str, Any]:
         "actions": list(getattr(env, "action_names", range(env.action_space.shape[0]))),
         "privileged": list(getattr(env, "privileged_names", ())),
         **looks_in(env.observation_spaces, getattr(getattr(env, "sensor_options", None), "looks", PLAIN)),
+        **doors_in({"doors": getattr(getattr(env, "config", None), "doors", "shut")}),
     }
+
+
+def doors_in(made_with: Mapping[str, Any]) -> dict[str, str]:
+    """What `world_of` says of the doors between rooms: nothing where they are shut at the start of episodes."""
+    return {"doors": "open"} if made_with.get("doors") == "open" else {}
 
 
 def looks_in(spaces: Mapping[str, Any], looks: str) -> dict[str, str]:
@@ -117,6 +123,7 @@ def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, An
         found["depth_range"] = perception.depth_range
     if shape and world.get("looks", PLAIN) != PLAIN:
         found["looks"] = world["looks"]
+    found |= doors_in(world)
     found["privileged"] = list(world["privileged"]) if perception.mode == "state" else []
     return found
 

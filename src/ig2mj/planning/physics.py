@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from jaxtyping import Float
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.humanoid.robot import Humanoid
@@ -195,11 +196,36 @@ class PhysicsRung:
             running.close()
             self._follow(world, [])
 
+    def restart(self, world: int, number: int) -> None:
+        """Ends what a world's robot does without an outcome: the world begins another episode.
+
+        Args:
+          number: of the episode, for its random streams.
+        """
+        self.stop(world)
+        self._ended.pop(world, None)
+        self._numbers[world], self._count[world], self._asked[world] = number, 0, None
+
+    def command(self) -> Float[np.ndarray, "W n"]:
+        """The robot's action of the next agent step in every world, in its controller's units. Whoever takes the step
+        calls `follow` after it."""
+        action, self._carry = execution.advance(self.body, self.stage.agent, self._carry, self.stage.view)
+        return action
+
     def _act(self) -> None:
         """An agent step of all worlds."""
-        action, self._carry = execution.advance(self.body, self.stage.agent, self._carry, self.stage.view)
-        self.stage.act(action)
+        self.stage.act(self.command())
         self.watch()
+        self._followed()
+
+    def follow(self) -> dict[int, Outcome]:
+        """What the agent step after `command` has led to: worlds go on with their next programs. Outcomes of the worlds
+        whose primitives have ended."""
+        self._followed()
+        ended, self._ended = self._ended, {}
+        return ended
+
+    def _followed(self) -> None:
         for world, running in enumerate(self._running):
             if running is None:
                 continue

@@ -28,6 +28,7 @@ from ig2mj.tasks.bddl.definitions import activity_names
 from ig2mj.tasks.bddl.goal import conditions
 from ig2mj.tasks.bddl.start import load_bound
 from ig2mj.tasks.bddl.task import PREFIX, BddlTask, activity_pool, bddl_task
+from ig2mj.tasks.homes import in_home
 from ig2mj.tasks.own_goal import goal_task, split_goal_name
 from ig2mj.tasks.pools import pool_of
 from ig2mj.tasks.registry import TASKS, load_task
@@ -84,12 +85,13 @@ class Problem:
         return pool_of(self.task, split, count)
 
 
-def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) -> Problem:
+def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = (), home: str | None = None) -> Problem:
     """The problem of an activity's name, or of a scene and a goal.
 
     Args:
       what: an activity of BEHAVIOR or of the paper, a home that ships, or a folder of a scene.
       goal: expression; None: that of the activity. objects: what is added to a home, and changed in it (`load_scene`).
+      home: of an activity of BEHAVIOR, in place of its own; None: its own.
 
     Raises:
       UnknownNameError: no such activity, scene, object or predicate. PlanningError: a scene without a goal, or objects
@@ -101,6 +103,9 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = ()) 
         raise PlanningError(f"{short}: an activity has its own objects; add yours to a home, and give a goal")
     if short in activity_names():
         task = bddl_task(short)
+        if home is not None:
+            task = in_home(task, home)
+            assert isinstance(task, BddlTask)
         scene = load_bound(task.binding)
         model = StateModel.of_manifest(scene.tables, scene.manifest)
         compiled = conditions(task.binding).compile_goal(model) if goal is None else _compiled(model, goal)

@@ -112,21 +112,30 @@ class Solving:
     ):
         self._planner, self._rung, self._watch, self._ended = planner, rung, watch, ended
         self._end = time.monotonic() + seconds
-        self._episodes: list[_Episode] = []
+        self._episodes: dict[int, _Episode] = {}
         for world in range(rung.num_worlds) if worlds is None else worlds:
-            episode = _Episode(rung.facts(world).truth(planner.goal.atoms), time.monotonic())
-            self._episodes.append(episode)
-            self._next(world, episode)
+            self.begin(world)
+
+    def begin(self, world: int) -> None:
+        """A new episode in a world, which is planned from what holds there now. Raises as `solve`."""
+        episode = _Episode(self._rung.facts(world).truth(self._planner.goal.atoms), time.monotonic())
+        self._episodes[world] = episode
+        self._next(world, episode)
 
     @property
     def done(self) -> bool:
         """All episodes are over."""
-        return all(e.result is not None for e in self._episodes)
+        return all(e.result is not None for e in self._episodes.values())
 
     @property
     def results(self) -> list[EpisodeResult]:
         """Of the episodes that are over."""
-        return [e.result for e in self._episodes if e.result is not None]
+        return [e.result for e in self._episodes.values() if e.result is not None]
+
+    @property
+    def planned(self) -> int:
+        """Steps of the longest first plan."""
+        return max((e.planned for e in self._episodes.values()), default=0)
 
     def take(self, outcomes: Mapping[int, Outcome]) -> None:
         """Goes on with the worlds whose primitives have ended."""

@@ -1,0 +1,63 @@
+"""Ground primitives of a problem: all that a robot can be asked to do with the objects that the problem names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ig2mj.planning.domain import Domain
+from ig2mj.planning.problem import Problem
+from ig2mj.planning.steps import PRIMITIVES, Step, make_step
+from ig2mj.tasks.task import GROUND
+
+
+def named_things(domain: Domain, problem: Problem) -> list[str]:
+    """Objects that the problem names, and tools, knives, taps, sources of heat and cold."""
+    rooms = domain.model.tables.room_names
+    names = [n for n in problem.named if n not in rooms and _category(domain, n) not in GROUND]
+    sources = [s.name for s in domain.sources]
+    return list(dict.fromkeys([*names, *domain.tools, *domain.knives, *domain.taps, *sources]))
+
+
+def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
+    """The primitives, each with the objects that it can be about."""
+    things, tables = named_things(domain, problem), domain.model.tables
+    loose = [n for n in things if not domain.fixed(n)]
+    rooms = [n for n in tables.room_names if n in problem.named] or list(tables.room_names)
+    shell = (*GROUND, "door", "window")  # parts of the house rather than things in it
+    opens = [n for n in domain.openable if n in things or _category(domain, n) not in shell]
+    able = {
+        "navigate_to": things,
+        "grasp": loose,
+        "release": loose,
+        "open": opens,
+        "close": opens,
+        "toggle_on": [n for n in things if domain.has(n, "toggleable")],
+        "toggle_off": [n for n in things if domain.has(n, "toggleable")],
+        "wipe": [n for n in things if domain.has(n, "dustyable")],
+        "scrub": [n for n in things if domain.has(n, "stainable")],
+        "soak": [n for n in loose if domain.has(n, "soakable")],
+        "slice": [n for n in things if domain.has(n, "sliceable")],
+        "cook": [n for n in loose if domain.has(n, "cookable")],
+        "freeze": [n for n in loose if domain.has(n, "freezable")],
+    }
+    second = {
+        "place_on_floor": rooms,
+        "wipe": domain.tools,
+        "scrub": [t for t in domain.tools if domain.has(t, "soakable")],
+        "soak": domain.taps,
+        "slice": domain.knives,
+    }
+    for primitive, kind in PRIMITIVES.items():
+        first = able.get(primitive, loose)
+        if len(kind.arguments) == 1:
+            yield from (make_step(primitive, (n,)) for n in first)
+            continue
+        for name in first:
+            others = second.get(primitive, things)
+            if primitive in ("cook", "freeze"):
+                others = [s.name for s in (domain.heaters if primitive == "cook" else domain.coolers)(name)]
+            yield from (make_step(primitive, (name, other)) for other in others if other != name)
+
+
+def _category(domain: Domain, name: str) -> str:
+    return domain.model.tables.object_categories[domain.index(name)]
