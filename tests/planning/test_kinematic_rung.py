@@ -40,6 +40,21 @@ def test_what_a_hand_takes_goes_along_until_it_is_put_down(rung):
     assert rung.facts(0).held == () and rung.facts(0).holds("on_top", "apple", "table")
 
 
+@pytest.mark.slow
+def test_an_arm_carries_its_hand_to_where_it_is_planned(tiny_home_folder):
+    problem = problem_of(str(tiny_home_folder), "(on_top apple table)")
+    ((_, rung),) = kinematic_episodes(Domain(problem.model, 1), problem, None, [0], robot="fetch")
+    assert do(rung, "grasp", "apple").done
+    robot, stage = rung._robots[0], rung._stage
+    agent = stage.view.agent
+    np.testing.assert_allclose(np.asarray(agent.base_pos)[0, 0, :2], robot.xy, atol=1e-3)
+    np.testing.assert_allclose(np.asarray(agent.hand_pos)[0], [pos for pos, _ in robot.hands], atol=2e-2)
+    held = np.asarray(stage.view.object_pos)[0, stage.scene.object_index("apple")]
+    assert np.linalg.norm(held - robot.hands[0][0]) < 0.3
+    assert do(rung, "place_on_top", "apple", "table").done
+    assert rung.facts(0).holds("on_top", "apple", "table")
+
+
 def test_failures_have_the_reasons_of_physics(rung):
     assert do(rung, "place_on_top", "can", "stove").reason == "no_grasp"
     assert do(rung, "grasp", "table").reason == "no_grasp"

@@ -25,7 +25,7 @@ def test_the_body_rises_and_stays_there_in_the_next_program(robot):
     carry = execution.begin([[stretch(0.2)]])
     action, carry = execution.advance(body, 0, carry, view)
     assert action[0, height] == pytest.approx(0.05) and carry.running.all()
-    carry = execution.begin_some(carry, [[Phase(hand=0, reset=True)]], [[]])
+    carry = execution.begin_some(carry, {0: [Phase(hand=0, reset=True)]})
     action, carry = execution.advance(body, 0, carry, view)
     assert action[0, height] == pytest.approx(0.05)
 

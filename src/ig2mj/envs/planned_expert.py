@@ -51,10 +51,8 @@ class PlannedExpert:
         if rules is None or rules.goal is None:
             raise EngineError(f"{env.task.name} has no goal to plan for")
         check_robot(env.robot)
-        self._stage = _Observed(env)
-        self._rung = PhysicsRung(self._stage, seed)
-        self._planner = TaskPlanner(self._rung.domain, rules.goal)
-        self._solving = Solving(self._planner, self._rung, worlds=(), ended=self._ended)
+        self._stage, self._goal, self._seed = _Observed(env), rules.goal, seed
+        self._parts: tuple[PhysicsRung, Solving] | None = None  # made with the first state
         self._map = env.action_map
         count = env.num_worlds
         self.given_up = np.zeros(count, bool)
@@ -63,7 +61,7 @@ class PlannedExpert:
     @property
     def planned(self) -> int:
         """Steps of the longest first plan of the present episodes."""
-        return self._solving.planned
+        return 0 if self._parts is None else self._parts[1].planned
 
     def _ended(self, world: int, result: object) -> None:
         self.given_up[world], self._since[world] = True, 0
@@ -74,8 +72,12 @@ class PlannedExpert:
         Args:
           state: of the environment. Episodes that begin there are planned for from what holds in it.
         """
-        rung, solving = self._rung, self._solving
         self._stage.observe(state)
+        if self._parts is None:
+            rung = PhysicsRung(self._stage, self._seed)
+            planner = TaskPlanner(rung.domain, self._goal)
+            self._parts = rung, Solving(planner, rung, worlds=(), ended=self._ended)
+        rung, solving = self._parts
         begins = np.asarray(state.batch.world.step) == 0
         new = begins | ~self._begun
         for world in np.flatnonzero(new):
@@ -101,10 +103,6 @@ class _Observed(EnvironmentStage):
 
     def __init__(self, env: Environment):
         super().__init__(env, ends=False)
-
-    def observe(self, state: EnvState) -> None:
-        """What holds now."""
-        self._state = state
 
     def act(self, action: Float[np.ndarray, "W m"]) -> None:
         raise AssertionError("somebody else acts")

@@ -108,6 +108,10 @@ class EnvironmentStage:
             state = self.env.resume(state.batch, rows)
         self._state = state
 
+    def observe(self, state: EnvState) -> None:
+        """Goes on from a state of the environment that somebody else has made."""
+        self._state = state
+
     def write(self, write: Write) -> None:
         """Changes physics of the worlds between two steps, as somebody else may; `write` has a row for each world."""
         self._state = dataclasses.replace(self.state, batch=self.env.core.write(self.state.batch, write))

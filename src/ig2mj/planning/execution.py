@@ -6,7 +6,7 @@ Axes: W worlds, n numbers of the robot's action.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -61,17 +61,17 @@ def begin(programs: Sequence[Sequence[Phase]]) -> Carry:
     return Carry(packed, zero, zero, status, packed.at(zero), np.zeros(len(programs), np.float32))
 
 
-def begin_some(carry: Carry, programs: Sequence[Sequence[Phase] | None], kept: Sequence[Sequence[Phase]]) -> Carry:
-    """New programs in some worlds; the others go on.
-
-    Args:
-      programs: None where a world goes on. kept: the programs of all worlds that `carry` follows.
-    """
-    fresh = begin([kept[w] if p is None else p for w, p in enumerate(programs)])
-    new = np.array([p is not None for p in programs])
-    phase = np.where(new, 0, carry.phase)
-    status = np.where(new, fresh.status, carry.status)
-    return Carry(fresh.programs, phase, np.where(new, 0, carry.steps), status, fresh.programs.at(phase), carry.rise)
+def begin_some(carry: Carry, programs: Mapping[int, Sequence[Phase]]) -> Carry:
+    """New programs in some worlds; the others go on. `programs`: by the number of the world."""
+    if not programs:
+        return carry
+    new = np.array(list(programs), np.int64)
+    fresh = Programs.pack(list(programs.values()))
+    packed = carry.programs.with_rows(new, fresh)
+    phase, steps, status = carry.phase.copy(), carry.steps.copy(), carry.status.copy()
+    phase[new], steps[new] = 0, 0
+    status[new] = np.where(fresh.length > 0, RUNNING, DONE)
+    return Carry(packed, phase, steps, status, packed.at(phase), carry.rise)
 
 
 def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Float[np.ndarray, "W n"], Carry]:

@@ -24,6 +24,7 @@ from ig2mj.engine.snapshot import Snapshot, fitted
 from ig2mj.engine.view import PhysicsView
 from ig2mj.engine.writes import joints
 from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse, yaw_quat
+from ig2mj.planning.arms import ArmBody
 from ig2mj.planning.bodies import HoveringBody, Senses
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.domain import Domain
@@ -58,7 +59,7 @@ Pose = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4"]]
 @dataclasses.dataclass
 class _Robot:
     """Where the robot of one world is: its base (x, y in m, yaw in rad), its hands' frames, world frame, and what they
-    hold, with its pose in the hand's frame."""
+    hold, with its pose in the hand's frame. joints: of the arm that carries the hand; None: hands float."""
 
     xy: Float[np.ndarray, "2"]
     yaw: float
@@ -66,6 +67,7 @@ class _Robot:
     held: list[str]
     grasps: list[Pose | None]
     rise: float = 0.0
+    joints: Float[np.ndarray, "J"] | None = None
 
 
 class KinematicStage:
@@ -108,12 +110,27 @@ class KinematicStage:
         self._query.load(fitted(one, self._start, 1, self.scene.name))
         self._states = states
 
-    def put(self, base: Pose, hands: Sequence[Pose], held: Sequence[tuple[str, Pose]]) -> None:
-        """Puts the robot and what it holds somewhere, world frame."""
-        tables = self.scene.tables
+    def put(
+        self,
+        base: Pose,
+        hands: Sequence[Pose],
+        held: Sequence[tuple[str, Pose]],
+        joints_of_arm: tuple[Sequence[str], Float[np.ndarray, "J"]] | None = None,
+    ) -> None:
+        """Puts the robot and what it holds somewhere, world frame.
+
+        Args:
+          joints_of_arm: names and positions (rad or m) of the joints that carry the hand; None: hands float.
+        """
+        tables, model = self.scene.tables, self.scene.model
         addresses, values = list[int](), list[float]()
         bodies = [int(tables.agent_body[0]), *(int(b) for b in tables.hand_body[tables.hand_agent == 0])]
-        for body, pose in zip(bodies, (base, *hands), strict=True):
+        poses = (base, *hands)
+        if joints_of_arm is not None:
+            bodies, poses = bodies[:1], poses[:1]
+            addresses += [int(model.joint(name).qposadr[0]) for name in joints_of_arm[0]]
+            values += joints_of_arm[1].tolist()
+        for body, pose in zip(bodies, poses, strict=True):
             addresses += self._addresses(body)
             values += self._coordinates(body, pose)
         self._query.write(joints(self.scene.model.nq, np.array(addresses), np.array(values)))
@@ -121,16 +138,26 @@ class KinematicStage:
             self._query.place(self.scene.object_index(name), pos, quat)
 
     def _addresses(self, body: int) -> list[int]:
-        """Of the coordinates of a body that slides along three axes and turns freely."""
+        """Of the coordinates of a body that is free, or slides along three axes and turns freely."""
         model = self.scene.model
         first = int(model.jnt_qposadr[model.body_jntadr[body]])
-        kinds = model.jnt_type[model.body_jntadr[body] : model.body_jntadr[body] + model.body_jntnum[body]]
-        assert kinds.tolist() == [int(mujoco.mjtJoint.mjJNT_SLIDE)] * 3 + [int(mujoco.mjtJoint.mjJNT_BALL)]
+        assert self._is_free(body) or self._kinds(body) == [int(mujoco.mjtJoint.mjJNT_SLIDE)] * 3 + [
+            int(mujoco.mjtJoint.mjJNT_BALL)
+        ]
         return list(range(first, first + 7))
+
+    def _kinds(self, body: int) -> list[int]:
+        model = self.scene.model
+        return model.jnt_type[model.body_jntadr[body] : model.body_jntadr[body] + model.body_jntnum[body]].tolist()
+
+    def _is_free(self, body: int) -> bool:
+        return self._kinds(body) == [int(mujoco.mjtJoint.mjJNT_FREE)]
 
     def _coordinates(self, body: int, pose: Pose) -> list[float]:
         model = self.scene.model
         pos, quat = pose
+        if self._is_free(body):
+            return [*pos.tolist(), *quat.tolist()]
         first = int(model.body_jntadr[body])
         rest = model.body_quat[body]
         axes = np.stack([quat_rotate(rest, model.jnt_axis[first + k]) for k in range(3)])
@@ -185,7 +212,7 @@ class KinematicRung:
           PlanningError: the robot has no hands that planned motion can move.
         """
         body = body_of(stage.scene, stage.controller)
-        if not isinstance(body, HoveringBody):
+        if not isinstance(body, HoveringBody | ArmBody):
             name = stage.scene.tables.agent_names[0]
             raise PlanningError(f"motion of the hands of robot '{name}' cannot be planned (the humanoid's can)")
         self.body, self.domain = body, Domain(stage.model, len(body.hands))
@@ -205,13 +232,19 @@ class KinematicRung:
             for h in body.hands
         ]
         self._origin = np.asarray(agent.base_pos)[0, 0].astype(float), np.asarray(agent.base_quat)[0, 0].astype(float)
+        self._arm_names: list[str] = []
+        self._arm_start: Float[np.ndarray, "J"] | None = None
+        if isinstance(body, ArmBody):
+            self._arm_names = [stage.scene.tables.agent_joint_names[j] for j in body.model.joints]
+            self._arm_start = np.asarray(agent.joint_pos)[0, body.model.joints].astype(float)
         self._robots = [self._at_start() for _ in starts]
 
     def _at_start(self) -> _Robot:
         pos, quat = self._origin
         count = len(self.body.hands)
         yaw = float(np.arctan2(2 * quat[0] * quat[3], 1 - 2 * quat[3] ** 2))
-        return _Robot(pos[:2].copy(), yaw, list(self._rest), [""] * count, [None] * count)
+        joints = None if self._arm_start is None else self._arm_start.copy()
+        return _Robot(pos[:2].copy(), yaw, list(self._rest), [""] * count, [None] * count, joints=joints)
 
     @property
     def num_worlds(self) -> int:
@@ -260,7 +293,8 @@ class KinematicRung:
             for h, (name, grasp) in enumerate(zip(robot.held, robot.grasps, strict=True))
             if name and grasp is not None
         ]
-        self._stage.put(self._base(robot), robot.hands, held)
+        arm = None if robot.joints is None else (self._arm_names, robot.joints)
+        self._stage.put(self._base(robot), robot.hands, held, arm)
 
     def _base(self, robot: _Robot) -> Pose:
         return np.array([*robot.xy, self._height + robot.rise]), yaw_quat(robot.yaw)
@@ -268,7 +302,7 @@ class KinematicRung:
     def _follow(self, world: int, program: Program, step: Step) -> str:
         """What a program does; the reason why it failed."""
         reason, acts = "", False
-        for phase in program:
+        for phase in self.body.prepared(program):
             self._move_base(world, phase)
             if phase.hand >= 0:
                 acts = True
@@ -305,11 +339,30 @@ class KinematicRung:
                 quat = np.array(phase.quat) if not phase.in_body else quat_multiply(base[1], np.array(phase.quat))
             if phase.pos is not None:
                 grip = np.array(phase.pos) if not phase.in_body else base[0] + quat_rotate(base[1], np.array(phase.pos))
-            robot.hands[hand] = grip - quat_rotate(quat, self.body.grips[hand]), quat
+            if robot.joints is not None and (lost := self._carry_hand(robot, grip, quat, phase)):
+                return lost
+            if robot.joints is None:
+                robot.hands[hand] = grip - quat_rotate(quat, self.body.grips[hand]), quat
         if phase.until == Until.HELD:
             return self._take(world, hand, phase.object, step)
         if phase.close is False and robot.held[hand]:
             self._let_go(world, hand)
+        return ""
+
+    def _carry_hand(self, robot: _Robot, grip: np.ndarray, quat: np.ndarray, phase: Phase) -> str:
+        """Moves the arm so that its hand's grasp point comes to a pose of the world; the reason why it does not."""
+        body = self.body
+        assert isinstance(body, ArmBody) and robot.joints is not None
+        base = self._base(robot)
+        goal, turn = _in(base, (np.asarray(grip, float), np.asarray(quat, float)))
+        ways = body.model.follow(robot.joints, goal[None], turn[None])
+        found = body.model.solve(goal, turn, robot.joints) if ways is None else ways[-1:]
+        if not len(found):
+            return phase.after and "no_path"
+        robot.joints = np.asarray(found[0], float)
+        point, own = body.model.hand(robot.joints[None])
+        at, turned = _of(base, (point[0], own[0]))
+        robot.hands[phase.hand] = at - quat_rotate(turned, body.grips[phase.hand]), turned
         return ""
 
     def _take(self, world: int, hand: int, index: int, step: Step) -> str:

@@ -146,6 +146,19 @@ class Programs:
             rise=column(lambda p: np.nan if p.rise is None else p.rise, np.float32),
         )
 
+    def with_rows(self, worlds: Int[np.ndarray, "k"], others: Programs) -> Programs:
+        """The same with the programs of `others` in k worlds. P is that of the longest program that was ever there."""
+        most = max(self.base.shape[1], others.base.shape[1])
+        found = {}
+        for f in dataclasses.fields(self):
+            old, new = getattr(self, f.name), getattr(others, f.name)
+            if f.name != "length":
+                old, new = (np.pad(a, [(0, 0), (0, most - a.shape[1]), *[(0, 0)] * (a.ndim - 2)]) for a in (old, new))
+            old = old.copy()
+            old[worlds] = new
+            found[f.name] = old
+        return Programs(**found)
+
     def at(self, phase: Int[np.ndarray, "W"]) -> dict[str, np.ndarray]:
         """The present phase of every world: each field but `length` without the P axis."""
         row = np.arange(len(phase))

@@ -24,7 +24,6 @@ from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.moves import Primitive, Program
-from ig2mj.planning.phases import Phase
 from ig2mj.planning.primitives import primitive
 from ig2mj.planning.stage import Stage
 from ig2mj.planning.steps import Outcome, PlanningError, Step, UnsupportedPrimitive
@@ -54,12 +53,19 @@ class PhysicsRung:
 
     name = "physics"
 
-    def __init__(self, stage: Stage, seed: int = 0, first: int | Sequence[int] = 0, query: SceneQuery | None = None):
+    def __init__(
+        self,
+        stage: Stage,
+        seed: int = 0,
+        first: int | Sequence[int] = 0,
+        query: SceneQuery | None = None,
+        planner: MotionPlanner | None = None,
+    ):
         """
         Args:
           seed, first: of random streams: a stream belongs to (seed, number, number of the step). The number of a world
             is first + world, or first[world].
-          query: a world of the stage's scene to sample spots in; None: a new one.
+          query, planner: a world of the stage's scene to sample spots in, and what plans ways there; None: new ones.
 
         Raises:
           PlanningError: the robot has no base that planned ways can move.
@@ -67,7 +73,7 @@ class PhysicsRung:
         self.stage, self.body = stage, body_of(stage.scene, stage.controller, stage.agent)
         body = self.body
         self.domain = Domain(stage.model, len(body.hands))
-        self._planner = MotionPlanner(stage.scene, stage.agent)
+        self._planner = planner or MotionPlanner(stage.scene, stage.agent)
         self._query = query
         self._seed = seed
         count = stage.num_worlds
@@ -150,9 +156,7 @@ class PhysicsRung:
         """A world's program, in place of the present one."""
         program = self.body.prepared(program) if isinstance(self.body, HandedBody) else program
         self._programs[world] = program
-        new: list[list[Phase] | None] = [None] * self.num_worlds
-        new[world] = program
-        self._carry = execution.begin_some(self._carry, new, self._programs)
+        self._carry = execution.begin_some(self._carry, {world: program})
 
     def _end(self, world: int, outcome: Outcome) -> None:
         self._running[world] = None
@@ -179,15 +183,13 @@ class PhysicsRung:
         """See `Rung.advance`."""
         while not self._ended and any(r is not None for r in self._running):
             self._act()
-        ended, self._ended = self._ended, {}
-        return ended
+        return self.take_ended()
 
     def step(self) -> dict[int, Outcome]:
         """As `advance`, for one agent step, which passes in any case: worlds without a primitive stand still."""
         if not self._ended:
             self._act()
-        ended, self._ended = self._ended, {}
-        return ended
+        return self.take_ended()
 
     def stop(self, world: int) -> None:
         """Ends a world's primitive without an outcome; hands hold what they hold."""
@@ -206,6 +208,33 @@ class PhysicsRung:
         self._ended.pop(world, None)
         self._numbers[world], self._count[world], self._asked[world] = number, 0, None
 
+    def program(self, world: int) -> Program:
+        """The program of a world's robot; empty where it has none."""
+        return self._programs[world]
+
+    def proceed(self, world: int, reason: str, seconds: float) -> dict[int, Outcome]:
+        """The program of a world has ended where somebody else follows it (`ig2mj.planning.away`).
+
+        Args:
+          reason: why it failed, "" for success. seconds: simulated s that it took.
+
+        Returns:
+          The outcome, if the primitive has ended.
+        """
+        self._steps[world] += round(seconds / ACTION_PERIOD)
+        running = self._running[world]
+        if running is not None and self._steps[world] > MOST_STEPS:
+            running.close()
+            self._end(world, Outcome("timeout", f"{MOST_STEPS * ACTION_PERIOD:.0f} s have passed"))
+        elif running is not None:
+            self._next(world, reason)
+        return self.take_ended()
+
+    def take_ended(self) -> dict[int, Outcome]:
+        """Outcomes of primitives that have ended and were not taken yet."""
+        ended, self._ended = self._ended, {}
+        return ended
+
     def command(self) -> Float[np.ndarray, "W n"]:
         """The robot's action of the next agent step in every world, in its controller's units. Whoever takes the step
         calls `follow` after it."""
@@ -222,8 +251,7 @@ class PhysicsRung:
         """What the agent step after `command` has led to: worlds go on with their next programs. Outcomes of the worlds
         whose primitives have ended."""
         self._followed()
-        ended, self._ended = self._ended, {}
-        return ended
+        return self.take_ended()
 
     def _followed(self) -> None:
         for world, running in enumerate(self._running):

@@ -262,6 +262,10 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
             raise EngineError(f"there is no world {world}: this engine has {self.num_worlds}")
         return jax.tree.map(np.array, self._row(fresh(physics), world))
 
+    def export_rows(self, physics: MjxPhysics, worlds: Int[np.ndarray, "k"]) -> Snapshot:
+        """Some worlds as a snapshot of k rows, on the device: one call for all of them. Compiled once for each k."""
+        return self._row(fresh(physics), worlds)
+
     def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
         """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""
         snapshot = fitted(snapshot, self._initial, self.num_worlds, self.scene.name)

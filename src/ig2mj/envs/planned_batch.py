@@ -1,0 +1,299 @@
+"""`PlannedBatch`: many worlds of an environment on any engine, each with a plan of its own.
+
+    env = problem_env(problem, worlds=1024, rows=1024, engine="warp")
+    with PlannedBatch(env, processes=60) as batch:
+        episodes = batch.run(range(2048))
+
+All worlds take an agent step together, in one call. Programs of all worlds are followed in one batch on the host
+(`ig2mj.planning.execution`). A world whose program has ended is copied to the process that plans for it, holds still
+until the answer is there, and delays no other world. Copies of several worlds leave the device together, in batches of
+`SIZES`, so that nothing is compiled again.
+
+Axes: W worlds.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from ig2mj.engine.mjx.engine import MjxEngine
+from ig2mj.engine.snapshot import Snapshot
+from ig2mj.envs.environment import Environment
+from ig2mj.envs.planning_processes import PlanningProcesses
+from ig2mj.envs.planning_stage import EnvironmentStage
+from ig2mj.errors import Ig2mjError
+from ig2mj.planning import execution
+from ig2mj.planning.away import WorldCopy
+from ig2mj.planning.bodies import HandedBody
+from ig2mj.planning.body_kinds import body_of
+from ig2mj.planning.moves import Program
+from ig2mj.planning.physics import check_robot
+from ig2mj.planning.solver import EpisodeResult
+
+REFILL = 16
+"""Share of the worlds, one in so many, whose episodes are over before they begin others: one call resets them all."""
+
+SIZES = (1, 8, 64, 256, 1024)
+"""Numbers of worlds that are copied together."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PlannedEpisode:
+    """What became of an episode.
+
+    Attributes:
+      number: of the episode. success: its goal held at the end. q: partial credit, 1 for a success; None: the planner
+        had not judged it when it ended. ended: why without success, in words. seconds: simulated s.
+    """
+
+    number: int
+    success: bool
+    q: float | None
+    ended: str
+    seconds: float
+
+
+@dataclasses.dataclass
+class Spent:
+    """Where the wall time of a run went.
+
+    Attributes:
+      stepping: s in the environment's step, until its results are there. following: s in which programs are followed
+        and answers read. copying: s in which worlds are copied. blocked: s in which no world had a program.
+      world_steps: agent steps of all worlds. waited: of these, those in which a world held still for its planner.
+      planned: processor s of all processes. primitives: programs that were planned.
+    """
+
+    stepping: float = 0.0
+    following: float = 0.0
+    copying: float = 0.0
+    blocked: float = 0.0
+    world_steps: int = 0
+    waited: int = 0
+    planned: float = 0.0
+    programs: int = 0
+
+    def figures(self) -> dict[str, float]:
+        """As JSON, with `planning_share`: share of wall time that is not the environment's stepping, and
+        `waiting_share`: share of all worlds' agent steps in which they held still for their planners."""
+        wall = self.stepping + self.following + self.copying + self.blocked
+        shares = {
+            "planning_share": round(1.0 - self.stepping / wall, 4) if wall else 0.0,
+            "waiting_share": round(self.waited / self.world_steps, 4) if self.world_steps else 0.0,
+        }
+        return {**{name: round(value, 3) for name, value in dataclasses.asdict(self).items()}, **shares}
+
+
+class PlannedBatch:
+    """See the module's text; a context manager.
+
+    Attributes:
+      env: the environment. stage: its worlds. body: how programs move the robot. planners: who plans.
+      spent: of all runs.
+    """
+
+    def __init__(self, env: Environment, processes: int = 0, seed: int = 0):
+        """
+        Args:
+          env: with a goal; its action has every number of the robot's. processes: that plan; 0: this one plans, and all
+            worlds wait. seed: of random streams.
+
+        Raises:
+          PlanningError: motion of the robot cannot be planned. EngineError: as of `EnvironmentStage`.
+        """
+        check_robot(env.robot)
+        self.env, self.spent = env, Spent()
+        self.stage = EnvironmentStage(env)
+        self.body = body_of(env.scene, self.stage.controller, 0)
+        self.planners = PlanningProcesses(env, processes, seed)
+        self._rows: Callable[..., Any] = jax.jit(lambda tree, index: jax.tree.map(lambda a: a[index], tree))
+
+    def run(
+        self,
+        numbers: Iterable[int],
+        watch: Callable[[PlannedEpisode], None] = lambda episode: None,
+        until: float = float("inf"),
+    ) -> list[PlannedEpisode]:
+        """Plays an episode of each number, W at a time: the next ones begin when all of these are over.
+
+        Args:
+          numbers: of episodes: row modulo the pool's size, and random stream. watch: called after each.
+          until: s of wall time after which episodes that are not over count as ended.
+        """
+        left, found, end = list(numbers), list[PlannedEpisode](), time.monotonic() + until
+        size = self.env.core.starts.pool.size
+        while left and time.monotonic() < end:
+            now, left = left[: self.env.num_worlds], left[self.env.num_worlds :]
+            padded = [*now, *[now[0]] * (self.env.num_worlds - len(now))]
+            self.stage.start(np.array([n % size for n in padded], np.int32))
+            found += _Episodes(self, watch, end).play(dict(enumerate(now)))
+        return found
+
+    def stream(
+        self,
+        episodes: int,
+        seed: int = 0,
+        watch: Callable[[PlannedEpisode], None] = lambda episode: None,
+        until: float = float("inf"),
+    ) -> list[PlannedEpisode]:
+        """Plays episodes from random rows of the pool; worlds begin another one while others go on.
+
+        Args:
+          episodes: that are to end. seed: of the rows. watch, until: see `run`.
+        """
+        self.stage.observe(self.env.reset(seed))
+        first = {world: world for world in range(min(self.env.num_worlds, episodes))}
+        return _Episodes(self, watch, time.monotonic() + until).play(first, episodes)
+
+    def copies(self, worlds: Sequence[int]) -> list[WorldCopy]:
+        """Copies of some worlds, on the host."""
+        engine, world = self.env.core.engine, self.stage.state.batch.world
+        found: list[WorldCopy] = []
+        if not isinstance(engine, MjxEngine):
+            for w in worlds:
+                leaves = [np.array(a[w : w + 1]) for a in jax.tree.leaves(world.states)]
+                found.append(WorldCopy(engine.export(world.physics, w), leaves))
+            return found
+        for first in range(0, len(worlds), SIZES[-1]):
+            chosen = list(worlds[first : first + SIZES[-1]])
+            size = next(s for s in SIZES if s >= len(chosen))
+            index = np.array([*chosen, *[chosen[0]] * (size - len(chosen))], np.int32)
+            physics, states = jax.device_get(
+                (engine.export_rows(world.physics, index), self._rows(world.states, index))
+            )
+            for k in range(len(chosen)):
+                one: Snapshot = jax.tree.map(lambda a, k=k: np.array(a[k]), physics)
+                found.append(WorldCopy(one, [np.array(a[k : k + 1]) for a in jax.tree.leaves(states)]))
+        return found
+
+    def close(self) -> None:
+        """Ends the processes that plan; may be called twice."""
+        self.planners.close()
+
+    def __enter__(self) -> PlannedBatch:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+
+class _Episodes:
+    """Episodes that are under way."""
+
+    def __init__(self, batch: PlannedBatch, watch: Callable[[PlannedEpisode], None], end: float):
+        self.batch, self.stage, self.planners, self.spent = batch, batch.stage, batch.planners, batch.spent
+        self.env, self.watch, self.end = batch.env, watch, end
+        count = batch.env.num_worlds
+        self.carry = execution.begin([[]] * count)
+        self.numbers: dict[int, int] = {}  # of the worlds whose episodes go on
+        self.over: list[int] = []  # worlds whose episodes are over
+        self.steps, self.begun = np.zeros(count, int), np.zeros(count, int)
+        self.results: dict[int, EpisodeResult | Ig2mjError] = {}
+        self.found: list[PlannedEpisode] = []
+
+    def play(self, first: Mapping[int, int], episodes: int = 0) -> list[PlannedEpisode]:
+        """Until all are over. `first`: numbers by world. `episodes`: worlds begin others until so many have begun."""
+        begun = len(first)
+        while self.planners.asked:  # of episodes that were over before their planner had answered
+            for _ in self.planners.answers(wait=True):
+                pass
+        self._begin(first)
+        while self.numbers:
+            if time.monotonic() >= self.end:
+                for world in list(self.numbers):
+                    self._ended(world, False, "the time limit passed")
+                break
+            if self._answers():
+                self._step()
+            room = max(1, self.env.num_worlds // REFILL)
+            free = [w for w in self.over if w not in self.planners.asked]
+            if begun < episodes and (len(free) >= room or not self.numbers):
+                new = {world: begun + k for k, world in enumerate(free[: episodes - begun])}
+                self.over = [w for w in self.over if w not in new]
+                began = time.perf_counter()
+                mask = np.isin(np.arange(self.env.num_worlds), list(new))
+                self.stage.observe(self.env.reset(self.stage.state, mask))
+                self.spent.stepping += time.perf_counter() - began
+                self._begin(new)
+                begun += len(new)
+        return self.found
+
+    def _begin(self, numbers: Mapping[int, int]) -> None:
+        began = time.perf_counter()
+        worlds = sorted(numbers)
+        self.numbers |= numbers
+        self.carry = execution.begin_some(self.carry, {world: [] for world in worlds})
+        for world, copy in zip(worlds, self.batch.copies(worlds), strict=True):
+            self.results.pop(world, None)
+            self.steps[world] = 0
+            self.planners.begin(world, numbers[world], copy)
+        self.spent.copying += time.perf_counter() - began
+
+    def _ended(self, world: int, success: bool, why: str) -> None:
+        number, result = self.numbers.pop(world), self.results.get(world)
+        q = 1.0 if success else result.q if isinstance(result, EpisodeResult) else None
+        seconds = float(self.steps[world] * self.env.period)
+        episode = PlannedEpisode(number, success, q, "" if success else why, seconds)
+        self.over.append(world)
+        self.carry = execution.begin_some(self.carry, {world: []})
+        self.found.append(episode)
+        self.watch(episode)
+
+    def _answers(self) -> bool:
+        """Takes the planners' answers; whether a step can be taken: some world has a program."""
+        began, before, fresh = time.perf_counter(), self.planners.seconds, dict[int, Program]()
+        idle = all(world in self.planners.asked for world in self.numbers)
+        for world, answer in self.planners.answers(wait=idle):
+            if world not in self.numbers:
+                continue
+            if isinstance(answer, list):
+                self.spent.programs += 1
+                body = self.batch.body
+                fresh[world] = body.prepared(answer) if isinstance(body, HandedBody) else answer
+                self.begun[world] = self.steps[world]
+                continue
+            self.results[world] = answer
+            success = isinstance(answer, EpisodeResult) and answer.success
+            self._ended(world, success, answer.ended if isinstance(answer, EpisodeResult) else str(answer))
+        self.carry = execution.begin_some(self.carry, fresh)
+        self.spent.planned += self.planners.seconds - before
+        took = time.perf_counter() - began
+        self.spent.blocked, self.spent.following = (
+            self.spent.blocked + took * idle,
+            self.spent.following + took * (not idle),
+        )
+        return bool(self.carry.running.any())
+
+    def _step(self) -> None:
+        """An agent step of all worlds, and requests for those whose programs have ended."""
+        spent, stage, began = self.spent, self.stage, time.perf_counter()
+        action, self.carry = execution.advance(self.batch.body, stage.agent, self.carry, stage.view)
+        spent.following += time.perf_counter() - began
+        began = time.perf_counter()
+        stage.act(action)
+        terminated, truncated = np.asarray(stage.state.terminated), np.asarray(stage.state.truncated)
+        spent.stepping += time.perf_counter() - began
+        self.steps += 1
+        spent.world_steps += len(self.numbers)
+        spent.waited += sum(world in self.planners.asked for world in self.numbers)
+        began = time.perf_counter()
+        for world in sorted(self.numbers):
+            if terminated[world] or truncated[world]:
+                self._ended(world, bool(terminated[world]), f"the horizon of {self.env.task.horizon} steps passed")
+        ended = [w for w in sorted(self.numbers) if not self.carry.running[w] and w not in self.planners.asked]
+        for world, copy in zip(ended, self.batch.copies(ended), strict=True):
+            seconds = float((self.steps[world] - self.begun[world]) * self.env.period)
+            self.planners.go_on(world, copy, self.carry.reason(world), seconds)
+        spent.copying += time.perf_counter() - began
+
+
+def line_of(episode: PlannedEpisode) -> str:
+    """An episode as a line of JSON."""
+    return json.dumps(dataclasses.asdict(episode))

@@ -1,0 +1,162 @@
+"""`PlanningProcesses`: processes that plan for the worlds of an environment, while the environment steps them.
+
+    with PlanningProcesses(env, 60) as planners:
+        planners.begin(world, number, copy)
+        for world, answer in planners.answers():
+            ...
+
+Each world belongs to one process, which keeps its plan (`ig2mj.planning.away`). Processes make the scene for
+themselves, on the native engine, with one thread and without a GPU.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import multiprocessing
+import multiprocessing.connection
+import os
+import signal
+from collections.abc import Iterator
+from typing import Any
+
+from ig2mj.cluster.reporting import ONE_THREAD
+from ig2mj.envs.config import EnvConfig
+from ig2mj.envs.environment import Environment
+from ig2mj.envs.registry import make
+from ig2mj.errors import EngineError, Ig2mjError
+from ig2mj.planning.away import Answer, PlanningAway, WorldCopy
+
+
+def planning_of(env: Environment, seed: int = 0) -> PlanningAway:
+    """What plans for copies of an environment's worlds, in this process. Raises EngineError: it has no goal."""
+    rules = env.core.rules
+    if rules is None or rules.goal is None:
+        raise EngineError(f"{env.task.name} has no goal to plan for")
+    return PlanningAway(env.scene, rules.model, rules.initial, rules.goal, seed)
+
+
+class PlanningProcesses:
+    """See the module's text; a context manager.
+
+    Attributes:
+      asked: worlds that wait for an answer. seconds: processor time that processes have planned, of all of them.
+    """
+
+    def __init__(self, env: Environment, processes: int, seed: int = 0):
+        """
+        Args:
+          env: made by name. processes: how many; 0: this one, which then plans when answers are asked for.
+
+        Raises:
+          EngineError: the environment has no goal.
+        """
+        self.asked: set[int] = set()
+        self.seconds = 0.0
+        self._here = planning_of(env, seed) if processes == 0 else None
+        self._queue: list[tuple[Any, ...]] = []
+        self._processes: list[Any] = []
+        self._pipes: list[multiprocessing.connection.Connection] = []
+        if processes == 0:
+            return
+        config = dataclasses.replace(env.config, worlds=1, engine="native", engine_options={}, observations=())
+        context, before = multiprocessing.get_context("spawn"), dict(os.environ)
+        os.environ.update(ONE_THREAD)
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            for _ in range(processes):
+                own, other = context.Pipe()
+                arguments = (other, env.task.name, config, seed)
+                process = context.Process(target=_serve, args=arguments, daemon=True)
+                process.start()
+                other.close()
+                self._processes.append(process)
+                self._pipes.append(own)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+            for name in ONE_THREAD:
+                os.environ.pop(name)
+            os.environ.update(before)
+
+    def begin(self, world: int, number: int, copy: WorldCopy) -> None:
+        """Asks for the first program of an episode; see `PlanningAway.begin`."""
+        self._ask(world, ("begin", world, number, copy))
+
+    def go_on(self, world: int, copy: WorldCopy, reason: str, seconds: float) -> None:
+        """Asks for the next program; see `PlanningAway.go_on`."""
+        self._ask(world, ("go_on", world, copy, reason, seconds))
+
+    def _ask(self, world: int, request: tuple[Any, ...]) -> None:
+        self.asked.add(world)
+        if self._here is not None:
+            self._queue.append(request)
+        else:
+            self._pipes[world % len(self._pipes)].send(request)
+
+    def answers(self, wait: bool = False) -> Iterator[tuple[int, Answer | Ig2mjError]]:
+        """Worlds and their answers that are there; an error of one of them is its answer.
+
+        Args:
+          wait: until there is at least one.
+
+        Raises:
+          EngineError: a process has ended.
+        """
+        if self._here is not None:
+            queue, self._queue = self._queue, []
+            for request in queue:
+                yield self._took(_answer(self._here, request))
+            return
+        ready = multiprocessing.connection.wait(self._pipes, None if wait and self.asked else 0.0)
+        for pipe in ready:
+            with contextlib.suppress(EOFError):
+                while pipe.poll():  # pyright: ignore[reportAttributeAccessIssue]
+                    yield self._took(pipe.recv())  # pyright: ignore[reportAttributeAccessIssue]
+                continue
+            raise EngineError("a process that plans has ended (is there enough memory for so many?)")
+
+    def _took(self, answer: tuple[int, Any, float]) -> tuple[int, Answer | Ig2mjError]:
+        world, found, seconds = answer
+        self.asked.discard(world)
+        self.seconds += seconds
+        return world, found
+
+    def close(self) -> None:
+        """Ends the processes; may be called twice."""
+        for pipe in self._pipes:
+            pipe.close()
+        for process in self._processes:
+            process.join(timeout=2.0)
+            if process.is_alive():
+                process.terminate()
+        self._processes, self._pipes = [], []
+
+    def __enter__(self) -> PlanningProcesses:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+
+def _answer(planning: PlanningAway, request: tuple[Any, ...]) -> tuple[int, Answer | Ig2mjError, float]:
+    """The number of the world, what it does next, and seconds of planning."""
+    import time
+
+    kind, world, *arguments = request
+    began = time.process_time()
+    try:
+        found: Any = getattr(planning, kind)(world, *arguments)
+    except Ig2mjError as e:
+        found = Ig2mjError(str(e))
+    except Exception as e:  # a fault of one world ends its episode, not those of others
+        found = Ig2mjError(f"{type(e).__name__}: {e}")
+    return world, found, time.process_time() - began
+
+
+def _serve(pipe: multiprocessing.connection.Connection, name: str, config: EnvConfig, seed: int) -> None:
+    """The work of a process, until the other end of the pipe is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    planning = planning_of(make(name, config), seed)
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            pipe.send(_answer(planning, pipe.recv()))
