@@ -152,6 +152,21 @@ class PlannedBatch:
         first = {world: world for world in range(min(self.env.num_worlds, episodes))}
         return _Episodes(self, watch, time.monotonic() + until).play(first, episodes)
 
+    def warm_up(self) -> None:
+        """Compiles what a run needs, and waits until all processes can plan. Its time is not counted."""
+        self.stage.observe(self.env.reset(0))
+        count = self.env.num_worlds
+        for size in (s for s in SIZES if s <= max(count, 1)):
+            self.copies(list(range(size)))
+        self.stage.act(np.zeros((count, self.body.size), np.float32))
+        self.stage.observe(self.env.reset(self.stage.state, np.ones(count, bool)))
+        for world, copy in enumerate(self.copies(list(range(min(count, self.planners.count))))):
+            self.planners.begin(world, world, copy)
+        while self.planners.asked:
+            for _ in self.planners.answers(wait=True):
+                pass
+        self.planners.seconds = 0.0
+
     def copies(self, worlds: Sequence[int]) -> list[WorldCopy]:
         """Copies of some worlds, on the host."""
         engine, world = self.env.core.engine, self.stage.state.batch.world

@@ -40,7 +40,8 @@ class PlanningProcesses:
     """See the module's text; a context manager.
 
     Attributes:
-      asked: worlds that wait for an answer. seconds: processor time that processes have planned, of all of them.
+      count: of the processes, at least 1. asked: worlds that wait for an answer.
+      seconds: processor time that processes have planned, of all of them.
     """
 
     def __init__(self, env: Environment, processes: int, seed: int = 0):
@@ -51,6 +52,7 @@ class PlanningProcesses:
         Raises:
           EngineError: the environment has no goal.
         """
+        self.count = max(processes, 1)
         self.asked: set[int] = set()
         self.seconds = 0.0
         self._here = planning_of(env, seed) if processes == 0 else None
