@@ -105,11 +105,13 @@ def _play(
     rng, worlds, size = np.random.default_rng(seed), env.num_worlds, env.action_space.shape[0]
     state, step = env.reset(seed), np.zeros(env.num_worlds, int)
     wild, left, kept, failed = np.zeros((worlds, size)), np.zeros(worlds, int), 0, 0
+    noisy = getattr(expert, "noisy", np.ones(size, bool))
     while kept < episodes:
         label = np.clip(np.asarray(expert(state)), -1, 1)
         begins = (left <= 0) & (rng.random(worlds) < disturbed)
         wild[begins], left[begins] = rng.uniform(-1, 1, (int(begins.sum()), size)), DISTURBED_STEPS
-        action = np.where((left > 0)[:, None], wild, label + noise * rng.standard_normal(label.shape))
+        disturbed_now = (left > 0)[:, None] & noisy
+        action = np.where(disturbed_now, wild, label + noise * noisy * rng.standard_normal(label.shape))
         left, step = left - 1, step + 1
         env.label = label.astype(np.float32)
         state = env.step_autoreset(state, np.clip(action, -1, 1).astype(np.float32))

@@ -36,6 +36,7 @@ class PlannedExpert:
     Attributes:
       given_up: [W] worlds whose present plan ended without the goal. They get actions that leave everything as it is,
         until their episode ends or, `AGAIN` steps later, the planner begins again.
+      noisy: [n] numbers of the action that noise may be added to: all but the eye's and the hands' switches.
     """
 
     def __init__(self, env: Environment, seed: int = 0):
@@ -54,6 +55,11 @@ class PlannedExpert:
         self._stage, self._goal, self._seed = _Observed(env), rules.goal, seed
         self._parts: tuple[PhysicsRung, Solving] | None = None  # made with the first state
         self._map = env.action_map
+        names = env.action_names
+        self._resets = [k for k, n in enumerate(names) if n.endswith("_reset")]
+        self._triggers = [k for k, n in enumerate(names) if n.endswith("_trigger")]
+        switches = ("_reset", "_trigger", "gripper", "_suction")
+        self.noisy = np.array([not n.endswith(switches) and not n.startswith("eye_") for n in names])
         count = env.num_worlds
         self.given_up = np.zeros(count, bool)
         self._since, self._episodes, self._begun = np.zeros(count, int), 0, np.zeros(count, bool)
@@ -95,7 +101,18 @@ class PlannedExpert:
         self._begun[:] = True
         action = np.asarray(rung.command(), np.float32)
         own = self._map
-        return np.clip(action[:, own.places] / own.scale, -1.0, 1.0).astype(np.float32)
+        return self._steady(np.clip(action[:, own.places] / own.scale, -1.0, 1.0).astype(np.float32), state)
+
+    def _steady(self, action: Float[np.ndarray, "W n"], state: EnvState) -> Float[np.ndarray, "W n"]:
+        """The same action, with switches that stay where they are far from where they switch: what is learned from it
+        need not be 0 to the last digit. A trigger adds up to 0 or 1, and a reset counts above 0."""
+        for k in self._resets:
+            action[:, k] = np.where(action[:, k] > 0, 1.0, -1.0)
+        pulled = getattr(state.batch.controllers[0], "trigger", None)
+        for hand, k in enumerate(self._triggers):
+            stays = np.where(np.asarray(pulled)[:, hand] > 0.5, 1.0, -1.0)
+            action[:, k] = np.where(action[:, k] == 0, stays, action[:, k])
+        return action
 
 
 class _Observed(EnvironmentStage):
