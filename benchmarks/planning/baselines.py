@@ -21,11 +21,12 @@ from ig2mj.planning import cleaning, grasping, moves, opening, placing, primitiv
 from ig2mj.planning.clearance import straight
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
+from ig2mj.planning.free_floor import FreeFloor, Point
 from ig2mj.planning.grounding import ground_steps
 from ig2mj.planning.hand_search import connect
-from ig2mj.planning.motion_planner import FreeFloor, Point
 from ig2mj.planning.moves import Primitive
 from ig2mj.planning.problem import Problem
+from ig2mj.planning.stances import behind_wall
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
 from ig2mj.planning.world import PlannedWorld, Stance
@@ -57,7 +58,7 @@ class RandomPlanner(_Wrapped):
 
     def __init__(self, planner: TaskPlanner, problem: Problem, seed: int):
         super().__init__(planner)
-        self.steps = ground_steps(planner.domain, problem)
+        self.steps = list(ground_steps(planner.domain, problem))
         self.rng = np.random.default_rng(seed)
         self._known: dict[int, tuple[object, int]] = {}
 
@@ -120,7 +121,8 @@ def igibson_settings() -> Iterator[None]:
     """
     with contextlib.ExitStack() as stack:
         stack.enter_context(patch.object(FreeFloor, "way", _base_way))
-        stack.enter_context(patch.object(PlannedWorld, "stances", _random_stances))
+        for module in (cleaning, grasping, opening, placing, primitives, pushing):
+            stack.enter_context(patch.object(module, "stances", _random_stances))
         for module in (moves, cleaning, grasping, opening, placing):
             stack.enter_context(patch.object(module, "hand_path", _hand_path))
         lacking = {name: _lacking for name in primitives.ACTIONS if name not in PRIMITIVES_OF_IGIBSON}
@@ -156,20 +158,20 @@ def _base_way(self: FreeFloor, start: Point, goal: Point) -> np.ndarray | None:
 
 
 def _random_stances(
-    self: PlannedWorld, hand: int, point: np.ndarray, floor: FreeFloor, away: float, most: int = 10, held: Any = None
+    world: PlannedWorld, hand: int, point: np.ndarray, floor: FreeFloor, away: float, most: int = 10, held: Any = None
 ) -> Iterator[Stance]:
-    """In place of `PlannedWorld.stances`."""
-    obstacles = self.obstacles()
+    """In place of `ig2mj.planning.stances.stances`."""
+    obstacles = world.obstacles()
     for _ in range(STANCES):
-        angle, apart = self.rng.uniform(-np.pi, np.pi), self.rng.uniform(0.2, self.body.reach)
+        angle, apart = world.rng.uniform(-np.pi, np.pi), world.rng.uniform(0.2, world.body.reach)
         xy = point[:2] + apart * np.array([np.cos(angle), np.sin(angle)])
         cell = np.clip(floor.occupancy.cells(xy[None])[0], 0, np.array(floor.free.shape) - 1)
         if not floor.free[tuple(cell)] or floor.spare[tuple(cell)] < BASE_CLEARANCE:
             continue
-        if self.behind_wall(obstacles, xy, point):
+        if behind_wall(world, obstacles, xy, point):
             continue
         stance = Stance((float(xy[0]), float(xy[1])), float(np.arctan2(*(point[:2] - xy)[::-1])))
-        if self.reaches(hand, stance, point):
+        if world.reaches(hand, stance, point):
             yield stance
 
 

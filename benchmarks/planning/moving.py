@@ -10,6 +10,7 @@ from ig2mj.engine.writes import teleports
 from ig2mj.envs.planning_stage import EnvironmentStage
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.solver import StepRecord
+from ig2mj.planning.spots import spots_for
 from ig2mj.planning.task_planner import TaskPlan
 from ig2mj.states.relations.rooms import rooms_of
 
@@ -39,7 +40,7 @@ class SomebodyElse:
         self._rng.shuffle(loose)
         for name in loose:
             for room in self._rooms(name):
-                spot = next(iter(world.spots("on_floor", name, room)), None)
+                spot = next(iter(spots_for(world, "on_floor", name, room)), None)
                 if spot is None:
                     continue
                 write = teleports(len(objects), domain.index(name), spot.pos, spot.quat)

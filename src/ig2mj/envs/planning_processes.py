@@ -110,12 +110,14 @@ class PlanningProcesses:
                 yield self._took(_answer(self._here, request))
             return
         ready = multiprocessing.connection.wait(self._pipes, None if wait and self.asked else 0.0)
-        for pipe in ready:
-            with contextlib.suppress(EOFError):
-                while pipe.poll():  # pyright: ignore[reportAttributeAccessIssue]
-                    yield self._took(pipe.recv())  # pyright: ignore[reportAttributeAccessIssue]
-                continue
-            raise EngineError("a process that plans has ended (is there enough memory for so many?)")
+        for pipe in (p for p in self._pipes if p in ready):
+            while pipe.poll():
+                try:
+                    answer = pipe.recv()
+                except EOFError:
+                    words = "a process that plans has ended (is there enough memory for so many?)"
+                    raise EngineError(words) from None
+                yield self._took(answer)
 
     def _took(self, answer: tuple[int, Any, float]) -> tuple[int, Answer | Ig2mjError]:
         world, found, seconds = answer

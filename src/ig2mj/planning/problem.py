@@ -125,8 +125,8 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = (), 
         raise PlanningError(f'{what} is a scene: give a goal, such as "(inside apple_0 fridge_0)"')
     scene = load_scene(what, objects=objects)
     model = StateModel.of_manifest(scene.tables, scene.manifest)
-    home = scene.name if scene.folder.parent == SHIPPED_HOMES else scene.folder.resolve()
-    return Problem(scene.name, scene, model, _compiled(model, goal), goal_task(home, goal), tuple(objects))
+    own = scene.name if scene.folder.parent == SHIPPED_HOMES else scene.folder.resolve()
+    return Problem(scene.name, scene, model, _compiled(model, goal), goal_task(own, goal), tuple(objects))
 
 
 def _compiled(model: StateModel, goal: str | Expression) -> CompiledExpression:
