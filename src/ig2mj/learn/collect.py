@@ -280,5 +280,6 @@ def if_ready(
     ready: Bool[Array, ""], update: Callable[[Any], tuple[Any, dict[str, Array]]], learner: Any
 ) -> tuple[Any, dict[str, Array]]:
     """What an update gives; while it is not time for it, the learner as it is, and losses of 0."""
+    update = jax.jit(update, inline=True)  # traced once, for its shapes and for the branch; the program is the same
     nothing = jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), jax.eval_shape(lambda x: update(x)[1], learner))
     return jax.lax.cond(ready, update, lambda learner: (learner, nothing), learner)
