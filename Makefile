@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
+SETUP ?= yes
 PYTEST_ARGS ?=
 # Environments of other projects' programs, and which of them `make test-interop` runs.
 INTEROP ?= .interop
@@ -17,7 +18,7 @@ help:
 	@echo "make demo       convert the small home, run it, cook a fish in it; leaves pictures, a plot, films, a report"
 	@echo "make test       the quick tests (JOBS=$(JOBS) processes)"
 	@echo "make test-slow  the tests that take long"
-	@echo "make test-gpu   the tests that need a CUDA device"
+	@echo "make test-gpu   the tests that need a CUDA device, in parts that go on (SETUP=no PYTHON=python3: installs nothing)"
 	@echo "make test-interop  with other projects' programs, each in an environment of its own (some GB; INTEROP_ENVS=...)"
 	@echo "make check      ruff and pyright"
 	@echo "make web        fetch three.js for the page of \`ig2mj vr\` (needs npm)"
@@ -83,8 +84,9 @@ test: setup
 test-slow: setup web
 	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "slow and not gpu" --timeout 1800 $(PYTEST_ARGS)
 
-test-gpu: setup
-	@JAX_PLATFORMS=cuda,cpu $(BIN)/python -m pytest -m gpu --timeout 1800 $(PYTEST_ARGS)
+# SETUP=no: with $(PYTHON) as it is, where nothing can be installed. The same command goes on where the last one stopped.
+test-gpu: $(if $(filter no,$(SETUP)),,setup)
+	@$(if $(filter no,$(SETUP)),$(PYTHON),$(BIN)/python) scripts/gpu_tests.py $(PYTEST_ARGS)
 
 # Each folder of tests/interop/ has the requirements of one environment, and tests that run in it (its README).
 test-interop: $(addprefix interop-,$(INTEROP_ENVS))

@@ -17,6 +17,7 @@ from ig2mj.agents.registry import make_robot
 from ig2mj.looks import visual_of
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import SHIPPED_HOMES, shipped_homes
+from ig2mj.scene.rooms import load_rooms
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.viewer.captions import caption
 from ig2mj.viewer.offscreen import FreeView, render
@@ -45,16 +46,15 @@ def rooms() -> None:
     """The largest room of each type over all homes, and a living room for the README."""
     best: dict[str, tuple[float, str, str]] = {}
     for home in shipped_homes():
-        scene = load_scene(home)
-        assert scene.rooms is not None
-        for k, (name, kind) in enumerate(zip(scene.rooms.names, scene.rooms.types, strict=True)):
-            area = float((scene.rooms.room_map == k + 1).sum()) * scene.rooms.resolution**2
+        rooms = load_rooms(SHIPPED_HOMES / home)
+        for k, (name, kind) in enumerate(zip(rooms.names, rooms.types, strict=True)):
+            area = float((rooms.room_map == k + 1).sum()) * rooms.resolution**2
             if area > best.get(kind, (0.0, "", ""))[0]:
                 best[kind] = area, home, name
-    tiles = [
-        tile(load_scene(home), room_view(load_scene(home), name), f"{kind.replace('_', ' ')} ({home})")
-        for kind, (_, home, name) in sorted(best.items())
-    ]
+    tiles = []
+    for kind, (_, home, name) in sorted(best.items()):
+        scene = load_scene(home)
+        tiles.append(tile(scene, room_view(scene, name), f"{kind.replace('_', ' ')} ({home})"))
     sheet(tiles, 4).save(FOLDER / "gallery_rooms.jpg", quality=QUALITY)
     scene = load_scene("birch")
     tile(scene, room_view(scene, "living_room_0"), "", (960, 540)).save(FOLDER / "room.jpg", quality=QUALITY)

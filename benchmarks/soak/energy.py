@@ -139,8 +139,7 @@ class EnergyWatch:
         top = most.max(0)
         thing = largest.argmax(1)[most.argmax(0), jnp.arange(len(CLASSES))].astype(jnp.int32)
 
-        height = jnp.asarray(view.object_com)[..., 2]
-        own = kinetic + jnp.where(used, self._mass * self._gravity * height, 0.0)
+        own = kinetic + jnp.where(used, self._potential(view), 0.0)
         speed = jnp.asarray(self._engine.snapshot(physics).whole("qvel"), jnp.float32)
         robot = 0.5 * (self._robot_inertia * speed**2).sum(1)
         robot += self._gravity * (self._robot_mass * jnp.asarray(view.body_pos)[..., 2]).sum(1)
@@ -164,6 +163,13 @@ class EnergyWatch:
             force=force,
             speed=speed,
         )
+
+    def of_objects(self, view: PhysicsView) -> Float[Array, "W"]:
+        """Kinetic and potential energy of all loose objects together."""
+        return jnp.where(self._loose, self._kinetic(view) + self._potential(view), 0.0).sum(-1)
+
+    def _potential(self, view: PhysicsView) -> Float[Array, "W O"]:
+        return self._mass * self._gravity * jnp.asarray(view.object_com)[..., 2]
 
     def _force(self, physics: Any) -> Float[Array, "W nv"]:
         """What the servos did in the last physics step."""
