@@ -12,6 +12,7 @@ from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 from ig2mj.cli.common.tasks import TaskOption, use_task
 from ig2mj.errors import Ig2mjError
+from ig2mj.process.gc_pause import GC_PAUSED
 
 if TYPE_CHECKING:
     from ig2mj.scene.scene import Scene
@@ -113,9 +114,10 @@ def run(
     model_file(scene)
     check_display()
     print(f"loading {scene}; the viewer opens when it is ready", file=sys.stderr, flush=True)
-    from ig2mj.simulation import Simulation
+    with GC_PAUSED:
+        from ig2mj.simulation import Simulation
 
-    world = Simulation(_with_robot(scene, object, robot, robot_at, looks))
+        world = Simulation(_with_robot(scene, object, robot, robot_at, looks))
     if seconds > 0:
         world.step(count=round(seconds * 30))
     world.launch_viewer(paused=paused)

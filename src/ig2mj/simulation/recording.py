@@ -24,7 +24,6 @@ from ig2mj.demos.replay import Replayed
 from ig2mj.demos.writer import FLUSH, FORMAT_VERSION, RunWriter
 from ig2mj.engine.base import Physics
 from ig2mj.errors import EngineError, InputError
-from ig2mj.process import entry_point
 from ig2mj.simulation.saving import SavedWorld, put_world
 from ig2mj.worlds.hands import Held
 
@@ -34,35 +33,6 @@ if TYPE_CHECKING:
 KIND = "simulation"
 
 BINDING = ("mujoco", "scene_hash", "model_hash", "engine", "substeps", "timestep", "grasping", "acting_states")
-
-
-@entry_point
-class Recorded:
-    """What a `Simulation` does about recordings of itself."""
-
-    _recorder: SimulationRecorder | None = None
-
-    def record(self, file: str | os.PathLike) -> SimulationRecorder:
-        """Records every control step from now on, until the recorder is closed; a context manager.
-
-        Args:
-          file: HDF5, replaced if it is there.
-
-        Raises:
-          InputError: it cannot be written. EngineError: this simulation is recorded already.
-        """
-        return SimulationRecorder(self, file)  # pyright: ignore[reportArgumentType]
-
-    def replay(self, file: str | os.PathLike) -> Replayed:
-        """Takes every control step of a recording again, and compares every byte of every frame.
-
-        The world is the recording's last one afterwards. Natively it comes out the same.
-
-        Raises:
-          InputError: the file is broken, or of another scene, engine, version or way of grasping; it names the pair.
-        """
-        with Recording(file) as recording:
-            return _replayed(self, recording)  # pyright: ignore[reportArgumentType]
 
 
 class SimulationRecorder:
@@ -158,7 +128,7 @@ def _same(a: Any, b: Any) -> bool:
     return a is b or np.asarray(a).tobytes() == np.asarray(b).tobytes()
 
 
-def _replayed(simulation: Simulation, recording: Recording) -> Replayed:
+def replayed(simulation: Simulation, recording: Recording) -> Replayed:
     here = _origin(simulation, recording.version)
     if recording.header.get("kind") != KIND:
         fix = "`ig2mj demos replay FILE` replays it"

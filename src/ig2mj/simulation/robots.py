@@ -11,10 +11,10 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import ActionError, EngineError, UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.sampling.row import Row
-from ig2mj.simulation.agent import Agent
 from ig2mj.worlds.hands import Held
 
 if TYPE_CHECKING:
+    from ig2mj.simulation.agent import Agent
     from ig2mj.simulation.simulation import Simulation
 
 
@@ -45,6 +45,8 @@ class RobotsOfWorld:
         if name not in names:
             raise UnknownNameError("robot", name, names)
         if name not in self._agents:
+            from ig2mj.simulation.agent import Agent
+
             self._agents[name] = Agent(self._simulation, name)
         return self._agents[name]
 

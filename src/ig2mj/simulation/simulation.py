@@ -17,7 +17,7 @@ import dataclasses
 import functools
 import os
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -42,9 +42,8 @@ from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Objects, Scene, scene_with
 from ig2mj.simulation import images
-from ig2mj.simulation.agent import Agent, only_agent
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
-from ig2mj.simulation.recording import Recorded
+from ig2mj.simulation.recorded import Recorded
 from ig2mj.simulation.robots import RobotsOfWorld, put_row
 from ig2mj.simulation.sampling import WorldSampler
 from ig2mj.simulation.saving import everything, first_batch, load_world, put_world, save_world
@@ -56,6 +55,9 @@ from ig2mj.worlds.core import Core
 from ig2mj.worlds.plugin_states import completed
 from ig2mj.worlds.rules import Rules
 from ig2mj.worlds.worlds import controllers_of, grasping_of
+
+if TYPE_CHECKING:
+    from ig2mj.simulation.agent import Agent
 
 
 @entry_point
@@ -202,6 +204,8 @@ class Simulation(Recorded):
         Raises:
           EngineError: there is none, or there are several. PlanningError: its motion cannot be planned.
         """
+        from ig2mj.simulation.agent import only_agent
+
         return only_agent(self)
 
     @property
