@@ -1,6 +1,6 @@
 """All tests that need a GPU, a process for each file, several side by side; goes on where an earlier call stopped.
 
-    python scripts/gpu_tests.py [FILE ...] [--minutes N] [--jobs N] [--out FOLDER] [--again failed|all] [PYTEST_OPTION ...]
+    python scripts/gpu_tests.py [FILE ...] [--minutes N] [--jobs N] [--out FOLDER] [--again failed|all] [PYTEST_OPTION]
 
 `make test-gpu` runs it with the interpreter of `.venv`; `make test-gpu SETUP=no PYTHON=python3` with that one, and
 installs nothing. Tests that have ended are noted in the folder and not run again, as long as `src` and `tests` are
@@ -95,19 +95,8 @@ def run_file(file: str, parts: Parts, until: float, args: argparse.Namespace) ->
     """Runs what is left of a file; whether all of it has ended. `until`: of `time.monotonic`."""
     done = [test for test in parts.outcomes if test.startswith(f"{file}::")]
     log = args.out / f"{pathlib.PurePath(file).stem}.txt"
-    words = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-m",
-        "gpu",
-        "-v",
-        "--tb=short",
-        "--durations=5",
-        "--timeout",
-        "1800",
-        file,
-    ]
+    words = [sys.executable, "-m", "pytest", "-m", "gpu", file, "-v", "--tb=short", "--durations=5"]
+    words += ["--timeout", "1800"]
     words += ["-W", "default::DeprecationWarning", "-o", f"cache_dir={args.out / 'cache'}"]
     words += [*(f"--deselect={test}" for test in done), *args.pytest]
     flags = os.environ.get("XLA_FLAGS", "")

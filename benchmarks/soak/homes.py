@@ -158,7 +158,7 @@ def part(cell: Cell, args: Args) -> dict[str, Any]:
 def at_rest(home: str, args: Args) -> dict[str, Any]:
     """A settled home without anybody: the largest gain of energy that any world shows at the end of a call."""
     scene, worlds = load_scene(home), min(args.worlds, 64)
-    engine = make_engine(args.engine, scene, worlds, initial=settle(scene))
+    engine = make_engine(args.engine, scene, worlds)
     energy = EnergyWatch(engine, ~np.asarray(engine.tables.object_fixed), 1)
     steps = 250
 
@@ -170,7 +170,7 @@ def at_rest(home: str, args: Args) -> dict[str, Any]:
         return physics, energy.of_objects(engine.view(physics))
 
     many = jax.jit(some, donate_argnums=0) if engine.pure else some
-    physics = engine.reset()
+    physics = engine.load(engine.reset(), settle(scene))
     first = np.asarray(energy.of_objects(engine.view(physics)))
     gain = 0.0
     for _ in range(0, REST_STEPS, steps * engine.substeps):
