@@ -250,6 +250,13 @@ def test_output_cut_off_by_head_is_no_error(tmp_path):
         assert b"Traceback" not in process.stderr.read()
 
 
+@pytest.mark.parametrize("closed", ["stdout", "stderr"])
+def test_a_stream_that_the_shell_closed_is_no_error(closed):
+    code = f"import sys; sys.{closed} = None; from ig2mj import cli; cli.main(['--help'])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_after_ctrl_c_no_library_is_torn_down():
     """XLA crashes there while a program is compiled, and status 139 would stand for what the user asked for."""
     code = (
