@@ -108,7 +108,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Console script: runs the sub-command named in `argv` (default: the process's arguments) and exits."""
     for stream in ("stdout", "stderr"):
         if getattr(sys, stream) is None:  # the shell closed it: `>&-`
-            setattr(sys, stream, open(os.devnull, "w"))  # noqa: SIM115  open as long as the process
+            setattr(sys, stream, pathlib.Path(os.devnull).open("w"))  # noqa: SIM115  as long as the process
     allow_spawning()
     # XLA's C++ warnings, such as of its emitter of LLVM code, say nothing to a user. Read when JAX is imported.
     default_variables({"TF_CPP_MIN_LOG_LEVEL": "2"})
