@@ -89,7 +89,7 @@ def _change_attribute(attributes: Any, random_: random.Random) -> None:
     del attributes[name]
     odd = [None, 7, -1, 2**40, 1.5, float("nan"), "", "[]", "{}", "null", "[[1]]", '{"a": [1]}', "../x", "\ud800x"]
     odd += [np.zeros(3), np.zeros((2, 2), int), np.array([["a"]], h5py.string_dtype())]
-    if isinstance(value, str) and value[:1] in "[{" and random_.random() < 0.6:
+    if isinstance(value, str) and value.startswith(("[", "{")) and random_.random() < 0.6:
         attributes[name] = json.dumps(mutated_json(json.loads(value), random_.randrange(10**6)))
     elif isinstance(value, np.ndarray) and random_.random() < 0.6:
         attributes[name] = _odd(value, random_, for_text=False)

@@ -49,6 +49,7 @@ class RobotBody:
         mujoco.mj_forward(self.model, self._data)
         for name, known in (
             *((j.name, self._joint_names()) for j in description.joints),
+            *((j.child, self.links()) for j in description.joints),
             *((link, self.links()) for link in {f.on for f in description.frames.values()}),
         ):
             if name not in known:
