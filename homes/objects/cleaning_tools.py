@@ -301,7 +301,7 @@ CATEGORIES = [
     Entry("toothbrush", toothbrush, (0.185, 0.014, 0.017), 0.018, 4),
     Entry("hairbrush", hairbrush, (0.230, 0.070, 0.040), 0.12, 3),
     Entry("paintbrush", paintbrush, (0.230, 0.060, 0.020), 0.08, 3),
-    Entry("vacuum", vacuum, (0.320, 0.300, 1.100), 6.0, 4, rest="upright", vary=0.05),
+    Entry("vacuum", vacuum, (0.320, 0.300, 1.100), 6.0, 4, rest="upright", vary=0.05, two_hands=True),
     Entry("carpet_sweeper", sweeper, (0.600, 0.300, 1.050), 2.0, 3, rest="upright", vary=0.05),
     Entry("scraper", scraper, (0.220, 0.080, 0.026), 0.12, 3),
     Entry("eraser", eraser, (0.055, 0.022, 0.013), 0.018, 3),

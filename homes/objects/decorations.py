@@ -310,7 +310,7 @@ def slab(b: ObjectBuilder, *, kind: str) -> None:
 
 
 CATEGORIES = [
-    Entry("painting", framed, (0.030, 0.800, 0.600), 2.2, 6, rest="upright", fixed=True, vary=0.15),
+    Entry("painting", framed, (0.030, 0.800, 0.600), 2.2, 6, rest="upright", fixed=True, vary=0.15, two_hands=True),
     Entry("picture", framed, (0.022, 0.420, 0.320), 0.8, 6, rest="upright", fixed=True, vary=0.15),
     Entry("whiteboard", board, (0.022, 1.200, 0.900), 8.0, 2, rest="upright", fixed=True, options={"kind": "white"}),
     Entry("bulletin_board", board, (0.020, 0.900, 0.600), 2.5, 3, rest="upright", fixed=True, options={"kind": "cork"}),
@@ -318,9 +318,10 @@ CATEGORIES = [
     Entry("grandfather_clock", grandfather_clock, (0.280, 0.480, 2.000), 45.0, 3, rest="upright", fixed=True,
                   vary=0.05),
     Entry("pot_plant", pot_plant, (0.320, 0.320, 0.520), 3.0, 8, rest="upright", uniform=True, vary=0.2),
-    Entry("christmas_tree", christmas_tree, (0.950, 0.950, 1.700), 9.0, 3, rest="upright", fixed=True, uniform=True),
+    Entry("christmas_tree", christmas_tree, (0.950, 0.950, 1.700), 9.0, 3, rest="upright", fixed=True, uniform=True,
+          two_hands=True),
     Entry("christmas_tree_decorated", christmas_tree, (0.950, 0.950, 1.700), 11.0, 3, rest="upright", fixed=True,
-                  uniform=True,
+                  uniform=True, two_hands=True,
           options={"decorated": True}),
     Entry("wreath", wreath, (0.300, 0.300, 0.055), 0.4, 3, uniform=True),
     Entry("tinsel", tinsel, (0.500, 0.160, 0.040), 0.08, 2),
@@ -329,5 +330,5 @@ CATEGORIES = [
     Entry("hook", hook, (0.050, 0.030, 0.080), 0.06, 2, rest="upright", fixed=True),
     Entry("hinge", hinge, (0.075, 0.090, 0.010), 0.09, 2),
     Entry("tile", slab, (0.300, 0.300, 0.010), 2.0, 4, options={"kind": "tile"}),
-    Entry("plywood", slab, (0.600, 1.000, 0.018), 6.5, 3, options={"kind": "plywood"}),
+    Entry("plywood", slab, (0.600, 1.000, 0.018), 6.5, 3, two_hands=True, options={"kind": "plywood"}),
 ]  # fmt: skip

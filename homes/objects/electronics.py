@@ -351,7 +351,7 @@ CATEGORIES = [
     Entry("hard_drive", box_device, (0.115, 0.078, 0.016), 0.18, 3, options={"vents": False}),
     Entry("cpu_board", tower, (0.240, 0.240, 0.040), 0.7, 2),
     Entry("router", router, (0.150, 0.220, 0.150), 0.4, 3, rest="upright"),
-    Entry("printer", printer, (0.380, 0.440, 0.300), 6.5, 5, rest="upright"),
+    Entry("printer", printer, (0.380, 0.440, 0.300), 6.5, 5, rest="upright", two_hands=True),
     Entry("facsimile", printer, (0.340, 0.360, 0.220), 4.0, 3, rest="upright", options={"phone": True}),
     Entry("scanner", scanner, (0.280, 0.430, 0.060), 2.4, 3, rest="upright"),
     Entry("alarm", alarm, (0.060, 0.110, 0.140), 0.28, 4, rest="upright"),

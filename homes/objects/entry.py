@@ -30,7 +30,8 @@ class Entry:
       rest: "any" (put down on any stable side), "standing" (mostly as built) or "upright" (only as built).
       vary: each edge is multiplied by a random factor of 1 +- vary; uniform: all three by the same.
       flesh: material of the cut faces; given for sliceable categories, whose models then come with halves.
-      two_hands: may be held by assisted grasping although it is heavier than `AG_MASS`: two hands carry it.
+      two_hands: may be held by assisted grasping, where it is free, although it is heavier than `AG_MASS` or mostly
+        fixed: two hands carry it.
       options: further keyword arguments of `build`.
     """
 
@@ -50,4 +51,4 @@ class Entry:
 
     @property
     def enable_ag(self) -> bool:
-        return not self.fixed and (self.mass <= AG_MASS or self.two_hands)
+        return self.two_hands or (not self.fixed and self.mass <= AG_MASS)

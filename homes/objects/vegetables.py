@@ -338,7 +338,7 @@ CATEGORIES = [
     Entry("lime", round_fruit, (0.050, 0.058, 0.050), 0.07, 3, options={"skins": ((0.42, 0.65, 0.20),), "stem": None}),
     Entry("cantaloup", round_fruit, (0.150, 0.150, 0.145), 1.3, 3, uniform=True,
           options={"skins": ((0.78, 0.70, 0.48),), "stem": None, "depth": 0.4}),
-    Entry("watermelon", round_fruit, (0.260, 0.340, 0.250), 7.0, 3, uniform=True,
+    Entry("watermelon", round_fruit, (0.260, 0.340, 0.250), 7.0, 3, uniform=True, two_hands=True,
           options={"skins": ((0.18, 0.40, 0.18), (0.30, 0.50, 0.24)), "stem": None, "depth": 0.5}),
     Entry("pumpkin", pumpkin, (0.260, 0.260, 0.220), 4.0, SMALL, extra=1, rest="standing", uniform=True,
           options={"skins": ("orange", (0.85, 0.42, 0.12))}),

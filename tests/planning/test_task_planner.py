@@ -93,6 +93,14 @@ def test_one_hand_puts_down_its_tool_before_it_takes_something_else(sampler, dir
     assert steps.index("release knife") < steps.index("grasp sponge") < steps.index("release sponge")
 
 
+def test_what_failed_in_the_present_world_comes_after_the_rest(sampler, start):
+    planner = planner_of(sampler.model, "(and (inside apple cabinet) (inside ball cabinet))")
+    facts = SymbolicRung(planner.domain, sampler, [start]).facts(0)
+    first = planner.plan(facts).steps[0].serves
+    again = planner.plan(facts, {first: 1}, None, {first})
+    assert again.steps[0].serves != first and again.steps[-1].serves == first, again.steps
+
+
 @pytest.mark.slow
 def test_halves_are_moved_after_a_cut(sampler, start):
     cut = started(sampler, start, "(sliced apple)")

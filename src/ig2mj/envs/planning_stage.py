@@ -25,6 +25,7 @@ from ig2mj.planning.starts import open_doors
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.guards import Flag
 
 DOORS_SETTLE = 0.5
 """s that pass after doors were opened, before an episode begins."""
@@ -127,6 +128,9 @@ class EnvironmentStage:
         if self._own_end and bool(np.asarray(self.state.terminated)[world]):
             return ""
         if bool(np.asarray(self.state.truncated)[world]):
+            if int(np.asarray(self.state.info["steps"])[world]) < self.env.task.horizon:
+                flags = Flag(int(np.asarray(self.state.info["flags"])[world]))
+                return f"physics went wrong: {', '.join(f.name.lower() for f in flags if f.name) or 'unknown'}"
             return f"the horizon of {self.env.task.horizon * self.env.period:.0f} s passed"
         return None
 

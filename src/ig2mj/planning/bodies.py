@@ -30,7 +30,7 @@ from ig2mj.geometry.host_rotations import (
     quat_to_rotation_vector,
 )
 from ig2mj.planning.clearance import Obstacles
-from ig2mj.planning.phases import Base, Phase
+from ig2mj.planning.phases import Base, Phase, Until
 from ig2mj.scene.scene import Scene
 
 AHEAD = 0.35
@@ -51,6 +51,9 @@ RADIUS, CORNER, BEHIND, ALONG = 0.03, 0.03, 0.014, (0.07, 0.1)
 the palm behind the grasp point; of the fingers ahead of it."""
 
 _BODY = tuple(f"body_{n}" for n in ("x", "y", "z", "roll", "pitch", "yaw"))
+
+QUICK = 0.08
+"""m of an empty hand that floats in an agent step."""
 
 UPRIGHT = 0.5
 """Share of a hovering body's tilt and of its error of height that is taken back in an agent step."""
@@ -311,8 +314,13 @@ class HoveringBody(_Body):
         return hand_spheres(fingers, palm)
 
     def prepared(self, program: Sequence[Phase]) -> list[Phase]:
-        """As it is."""
-        return list(program)
+        """With empty hands that are quick where nothing is touched."""
+        return [
+            dataclasses.replace(p, speed=QUICK)
+            if p.hand >= 0 and p.speed is None and p.keeps < 0 and p.until == Until.THERE and p.close is None
+            else p
+            for p in program
+        ]
 
     def follower(self, *_: Any) -> None:
         """None: the hands float."""

@@ -49,6 +49,9 @@ TURNS = (np.pi / 2, -np.pi / 2, np.pi)
 LOWEST = -0.3
 """Smallest z of the normal of a face that is cleaned."""
 
+OVER_TOP = 1.0
+"""m, height of dirt up to which a hand reaches over what it is on to the side that looks away."""
+
 NEAREST, STANCES, FEW = 8, 4, 4
 """Particles that stances are looked for, stances for each, and strokes of each of which one has to have a way."""
 
@@ -216,7 +219,8 @@ def _plan(
             for turn, region in enumerate(_regions(world, tool, hand, stance, aim.normal)):
                 standing, start = obstacles.about(stance.xy, *world.body.trunk), world.carried(hand, stance)
                 clear = _room(standing, _spheres(world, tool, hand, region))
-                plan = _strokes(world, hand, stance, turn, region, spots, clear)
+                over = _reach_over(world, tool, hand, standing, stance, region, start)
+                plan = _strokes(world, hand, stance, turn, region, spots, clear, over)
                 if plan is None or (best is not None and len(plan.covered) <= len(best.covered)):
                     continue
                 yaw = stance.yaw
@@ -227,6 +231,20 @@ def _plan(
                 ):
                     best = plan
     return best
+
+
+def _reach_over(
+    world: PlannedWorld,
+    tool: str,
+    hand: int,
+    standing: Obstacles,
+    stance: Stance,
+    region: _Region,
+    start: Vector,
+) -> Callable[[DirtSpot], bool]:
+    """Whether the hand comes to a face that looks away from the robot, as to the near inner side of a bathtub."""
+    follows = world.follows(hand, world.turned_hand(hand, region.rotation), standing, stance)
+    return lambda spot: bool(_way(world, tool, hand, standing, stance.yaw, region, start, spot, follows))
 
 
 def _room(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"]) -> Callable[[Vector], bool]:
@@ -242,16 +260,17 @@ def _strokes(
     region: _Region,
     spots: Sequence[DirtSpot],
     clear: Callable[[Vector], bool],
+    over: Callable[[DirtSpot], bool],
 ) -> _CleanPlan | None:
     """Places of the tool that cover most particles in reach from a stance, each next to the one before; `clear`: the
-    hand has room there."""
+    hand has room there; `over`: it comes to a face that looks away."""
     here = np.array(stance.xy)
     near = [
         s
         for s in spots
         if world.reaches(hand, stance, region.at(s))
-        and (s.normal[2] > 0.5 or (here - s.pos[:2]) @ s.normal[:2] > 0)
         and clear(region.at(s) + LIFTED * s.normal)
+        and (s.normal[2] > 0.5 or (here - s.pos[:2]) @ s.normal[:2] > 0 or (s.pos[2] < OVER_TOP and over(s)))
     ]
     left, strokes = list(near), []
     while left and len(strokes) < STROKES:

@@ -116,7 +116,7 @@ class Obstacles:
           without: numbers of objects. pieces: of the scene, asked before; None: all are placed now.
         """
         placed = (pieces or PlacedPieces(scene)).of(view, world)
-        self.objects = scene.tables.piece_object
+        self.objects, self._bodies = scene.tables.piece_object, scene.tables.piece_body
         self._keep = (self.objects >= 0) & ~np.isin(self.objects, list(without))
         self._body: tuple[float, ...] | None = None
         self._normal, self._offset, self._low, self._high = placed.normal, placed.offset, placed.low, placed.high
@@ -157,10 +157,11 @@ class Obstacles:
         return bool((away.max(-1, initial=-1.0) >= radius[sphere, 0]).all())
 
     def entries(
-        self, origins: Float[np.ndarray, "R 3"], directions: Float[np.ndarray, "R 3"], of: int
+        self, origins: Float[np.ndarray, "R 3"], directions: Float[np.ndarray, "R 3"], of: int, body: int | None = None
     ) -> Float[np.ndarray, "R"]:
-        """m along rays (unit vectors) to where each enters the first piece of an object; infinite: it meets none."""
-        mine = np.flatnonzero(self.objects == of)
+        """m along rays (unit vectors) to where each enters the first piece of an object, or of one body; infinite: it
+        meets none."""
+        mine = np.flatnonzero((self.objects == of) & (True if body is None else self._bodies == body))
         slope = np.einsum("kni,ri->rkn", self._normal[mine], directions)
         left = self._offset[mine] - np.einsum("kni,ri->rkn", self._normal[mine], origins)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -56,6 +56,11 @@ class Domain:
         """Whether an object is a part of the house."""
         return bool(self.model.tables.object_fixed[self.index(name)])
 
+    def graspable(self, name: str) -> bool:
+        """Whether hands take hold of an object itself, not only of its doors."""
+        tables = self.model.tables
+        return bool(((tables.graspable_object == self.index(name)) & (tables.graspable_joint < 0)).any())
+
     def volume(self, name: str) -> float:
         """Cubic metres of an object's box as it is modelled; of a room, 0."""
         tables = self.model.tables
@@ -98,12 +103,12 @@ class Domain:
     @functools.cached_property
     def tools(self) -> tuple[str, ...]:
         """Cleaning tools that can be carried."""
-        return self._loose("cleaningTool")
+        return tuple(t for t in self._loose("cleaningTool") if self.graspable(t))
 
     @functools.cached_property
     def knives(self) -> tuple[str, ...]:
-        """Objects that cut."""
-        return self._loose("slicer")
+        """Objects that cut and can be carried."""
+        return tuple(k for k in self._loose("slicer") if self.graspable(k))
 
     @functools.cached_property
     def taps(self) -> tuple[str, ...]:

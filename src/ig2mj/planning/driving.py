@@ -36,6 +36,9 @@ STEP = 0.1
 """m between stances at which what is held is checked."""
 
 
+QUICK = 0.12
+"""m in an agent step of a base whose hands are empty."""
+
 AT_LEAST, SLOWEST = 100, 0.02
 """Agent steps that a stretch of the way may take at least, and m in an agent step of the slowest base: its limit."""
 
@@ -59,7 +62,7 @@ def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
         way, before = world.floor(reaching=True).way(here, stance.xy), list[Phase]()
         if way is None:
             way, before = standing.way(here, stance.xy), tuck(world)
-        return "no_path" if way is None else (yield [*before, *drive(way, stance.yaw), *last])
+        return "no_path" if way is None else (yield [*before, *drive(way, stance.yaw, QUICK), *last])
     if tucked := tuck(world):
         yield tucked
     if apart < 0.3 and turned < 0.3 and clear_with_held(world, _between(Stance((here[0], here[1]), yaw), stance)):
@@ -133,11 +136,11 @@ def _between(start: Stance, end: Stance) -> list[Stance]:
     return [Stance((float(x), float(y)), end.yaw) for x, y in points]
 
 
-def drive(points: np.ndarray, yaw: float | None) -> Program:
-    """The program that follows a way, and at its end turns."""
+def drive(points: np.ndarray, yaw: float | None, speed: float | None = None) -> Program:
+    """The program that follows a way, and at its end turns; `speed`: m in an agent step, None: `phases.SPEED`."""
     apart = np.linalg.norm(np.diff(points, axis=0), axis=1)
     program = [
-        Phase(Base.DRIVE, xy=(float(x), float(y)), tolerance=0.08, limit=AT_LEAST + int(length / SLOWEST))
+        Phase(Base.DRIVE, xy=(float(x), float(y)), tolerance=0.08, limit=AT_LEAST + int(length / SLOWEST), speed=speed)
         for (x, y), length in zip(points[1:], apart, strict=True)
     ]
     if program:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from ig2mj.planning.footprint import LOWEST
 from ig2mj.planning.occupancy import RESOLUTION, Occupancy
 from ig2mj.tasks.navigation.floor import FloorMap
 
@@ -21,6 +22,10 @@ Point = Sequence[float] | np.ndarray
 
 NEAR_GOAL, NEAR_START = 0.15, 0.5
 """m from the goal within which a free cell will do, and from the robot within which the way may begin."""
+
+POCKET, STUCK, CHEST, LOOKED_AT = 60, 1.0, 1.05, 60
+"""Cells of a part of the floor in which a robot is shut in, at most; m within which it gets out of there; m, height up
+to which nothing that cannot move may be in between; and cells that are looked at."""
 
 COMFORT, CAUTION = 0.15, 3.0
 """m of spare room from which on a way is not lengthened by nearness, and by how much it is where there is none."""
@@ -54,6 +59,39 @@ class FreeFloor:
         best = int(np.argmin(apart))
         return cells[best] if apart[best] <= within else None
 
+    def begin(self, xy: Point, within: float) -> Int[np.ndarray, "2"] | None:
+        """The free cell from which a robot at a point begins its way: the nearest one, but where that is in a pocket,
+        as between the robot and what fell in front of it, the nearest outside that no wall or furniture is in front of;
+        within `STUCK` where none is nearer."""
+        nearest = self.nearest(xy, within)
+        if nearest is not None and self._sizes[self._labels[tuple(nearest)]] >= POCKET:
+            return nearest
+        cells = self.within(xy, max(within, STUCK))
+        cells = cells[self._sizes[self._labels[tuple(cells.T)]] >= POCKET]
+        order = np.argsort(np.linalg.norm(self.occupancy.middles(cells) - np.asarray(xy, float), axis=1))
+        some = order[:: max(1, len(order) // LOOKED_AT)]
+        here = self.occupancy.cells(np.asarray(xy, float))
+        return next((cells[k] for k in some if self._opens(here, cells[k])), nearest)
+
+    def _opens(self, one: Int[np.ndarray, "2"], other: Int[np.ndarray, "2"]) -> bool:
+        """Whether nothing that cannot move is on the line between the middles of two cells."""
+        count = 2 * int(np.abs(other - one).max()) + 1
+        line = np.round(one + np.linspace(0, 1, count)[:, None] * (other - one)).astype(int)
+        line = np.clip(line, 0, np.array(self.free.shape) - 1)
+        return not self.occupancy.still(LOWEST, CHEST)[tuple(line.T)].any()
+
+    @functools.cached_property
+    def _labels(self) -> Int[np.ndarray, "h w"]:
+        """Number of the part of the free floor that a cell belongs to; 0: it is not free."""
+        import scipy.ndimage
+
+        return np.asarray(scipy.ndimage.label(self.free, np.ones((3, 3)))[0])  # pyright: ignore[reportIndexIssue]
+
+    @functools.cached_property
+    def _sizes(self) -> Int[np.ndarray, "n"]:
+        """Cells of each part."""
+        return np.bincount(self._labels.ravel())
+
     def within(self, xy: Point, reach: float) -> Int[np.ndarray, "n 2"]:
         """Free cells whose middles are within `reach` (m) of a point."""
         point = np.asarray(xy, float)
@@ -69,12 +107,12 @@ class FreeFloor:
         Args:
           within: m from the point that the free cell is at most.
         """
-        start = self.nearest(xy, within)
+        start = self.begin(xy, within)
         return np.full(self.free.shape, np.inf) if start is None else self._field(start)[0]
 
     def way(self, start: Point, goal: Point) -> Float[np.ndarray, "N 2"] | None:
         """Points of a way between two positions, straightened; None where there is none."""
-        begin, end = self.nearest(start, NEAR_START), self.nearest(goal, NEAR_GOAL)
+        begin, end = self.begin(start, NEAR_START), self.nearest(goal, NEAR_GOAL)
         if begin is None or end is None:
             return None
         distance, before = self._field(begin)

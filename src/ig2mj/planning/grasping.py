@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 
 import numpy as np
 
+from ig2mj.planning.clearance import straight
 from ig2mj.planning.driving import go
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.grasps import GraspPose, grasp_poses, ordered
@@ -44,6 +45,9 @@ POSES, WAYS = 6, 40
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
 
 
+LOWER = 0.04
+"""m between the heights at which what is let go has to have room."""
+
 NEAREST = 200
 """Cells of the floor that are compared to find the edge of an object that is nearest to it."""
 
@@ -79,8 +83,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
 
 def is_graspable(world: PlannedWorld, name: str) -> bool:
     """Whether hands take hold of an object."""
-    tables = world.domain.model.tables
-    return bool(((tables.graspable_object == world.index(name)) & (tables.graspable_joint < 0)).any())
+    return world.domain.graspable(name)
 
 
 def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generator[Program, str, tuple[str, str]]:
@@ -181,7 +184,24 @@ def _nearest(world: PlannedWorld, floor: FreeFloor, points: np.ndarray) -> Vecto
 
 
 def release(world: PlannedWorld, step: Step) -> Primitive:
-    """Opens the hand, wherever it is."""
-    hand = hand_with(world, step.object)
-    reason = yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=15), *rest(hand)]
-    return Outcome() if step.object not in world.held else Outcome(reason or "not_true_after", "the hand did not open")
+    """Lowers what the hand holds as far as there is room, and opens the hand."""
+    name = step.object
+    hand = hand_with(world, name)
+    empty = [Phase(hand=hand, close=False, until=Until.EMPTY, limit=15), *rest(hand)]
+    reason = yield [*(_lowered(world, name, hand) if not world.domain.fixed(name) else []), *empty]
+    return Outcome() if name not in world.held else Outcome(reason or "not_true_after", "the hand did not open")
+
+
+def _lowered(world: PlannedWorld, name: str, hand: int) -> Program:
+    """The hand goes straight down until what it holds is right above what is below it, or as far as it reaches."""
+    obstacles, grip = world.obstacles([name], world.stance), world.grip(hand)
+    spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
+    low, down = grip, 0.0
+    for down in np.arange(LOWER, grip[2], LOWER):
+        there = grip - down * UP
+        if not world.reaches(hand, world.stance, there) or not straight(obstacles, spheres, low, there):
+            break
+        low = there
+    if low is grip:
+        return []
+    return [Phase(hand=hand, pos=vector3(low), keeps=world.index(name), tolerance=0.03, limit=40, after="")]

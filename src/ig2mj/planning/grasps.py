@@ -48,6 +48,13 @@ HIGH = 0.75
 OUTER = 0.8
 """Share of the way from an object's centre of mass to its rim at which it is taken, too."""
 
+LOW, UPRIGHT = 0.08, 0.5
+"""m above an object's lowest point below which a hand is in the way where it is put down; vertical part of a palm from
+which on it is not at the side."""
+
+GRAVITY, MOST_TORQUE, BURDEN = 9.81, 6.0, 0.6
+"""m/s2; Nm from which on a hand does not keep what it holds level; discomfort of what is held badly."""
+
 MIDDLES = 8
 """Pieces whose middles are aimed at, at most."""
 
@@ -58,12 +65,15 @@ class GraspPose:
 
     Attributes:
       point: of the surface, m. fingers, palm: unit vectors. before: m along -palm from which the hand comes straight.
+      burden: how badly the object is held there: far from below its centre of mass, or so low that the hand is in the
+        way when it is put down; 0 to 1.
     """
 
     point: Vector
     fingers: Vector
     palm: Vector
     before: float
+    burden: float = 0.0
 
     def at(self, away: float) -> Vector:
         """A point above the surface, m along its normal."""
@@ -111,7 +121,13 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     size = float(np.linalg.norm(np.ptp(corners, axis=0))) + 0.1
     normals = np.array([normal for normal, _ in _SIDES])
     origins = aims[None] + size * normals[:, None]
-    hits = obstacles.entries(origins.reshape(-1, 3), np.repeat(-normals, len(aims), axis=0), index)
+    main = np.flatnonzero((tables.graspable_object == index) & (tables.graspable_joint < 0))
+    rays = origins.reshape(-1, 3), np.repeat(-normals, len(aims), axis=0)
+    hits = obstacles.entries(*rays, index)
+    if len(main):  # not of lids and flaps, which hands do not take hold of
+        hits = np.where(
+            hits < obstacles.entries(*rays, index, int(tables.graspable_body[main[0]])) - 1e-6, np.inf, hits
+        )
     points, fingers, palms = [], [], []
     for (normal, ways), start, away in zip(_SIDES, origins, hits.reshape(len(normals), -1), strict=True):
         outermost = float((corners @ normal).max())
@@ -134,7 +150,13 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     for away in BEFORE:
         still = np.flatnonzero(before == 0.0)
         before[still[_room(body, obstacles, points[still], fingers[still], palms[still], away, 1.0)]] = away
-    found = [GraspPose(points[k], fingers[k], palms[k], float(before[k])) for k in np.flatnonzero(before > 0)]
+    lever = world.mass(name) * GRAVITY * np.linalg.norm((points - centre)[:, :2], axis=1)
+    low = (points[:, 2] < corners[:, 2].min() + LOW) & (np.abs(palms[:, 2]) < UPRIGHT)
+    burden = np.minimum(lever / MOST_TORQUE, 1.0) + low
+    found = [
+        GraspPose(points[k], fingers[k], palms[k], float(before[k]), min(float(burden[k]), 1.0))
+        for k in np.flatnonzero(before > 0)
+    ]
     if body.opening is None:
         return found
     others = set(range(len(tables.object_names))) - {index}
@@ -180,4 +202,8 @@ def _room(
 
 def ordered(poses: Sequence[GraspPose], yaw: float, on_arm: bool = False) -> list[GraspPose]:
     """The most comfortable first, for a robot that looks along `yaw`, rad. on_arm: its hand is on an arm."""
-    return sorted(poses, key=lambda pose: pose.discomfort(yaw, on_arm) + (0.2 if pose.before < BEFORE[0] else 0.0))
+
+    def cost(pose: GraspPose) -> float:
+        return pose.discomfort(yaw, on_arm) + (0.2 if pose.before < BEFORE[0] else 0.0) + BURDEN * pose.burden
+
+    return sorted(poses, key=cost)

@@ -110,6 +110,25 @@ def hand_path(
     return None
 
 
+RAISED, DRAWN_BACK = (0.0, 0.08, 0.16, 0.28, 0.4), (0.0, 0.12)
+"""m by which a hand is raised, and drawn back to the robot, where what it holds has no room to be turned."""
+
+
+def turning_point(obstacles: Obstacles, spheres: np.ndarray, start: Vector, yaw: float) -> Vector:
+    """Where a hand turns what it holds before it goes on: where it is, or the first point above or behind that has room
+    for it; where it is, if there is none.
+
+    Args:
+      spheres: of the hand and what it holds, as they are turned to. yaw: rad, of the robot.
+    """
+    for raised in RAISED:
+        for back in DRAWN_BACK:
+            point = start + raised * UP - back * ahead(yaw)
+            if obstacles.clear(np.column_stack([spheres[:, :3] + point, spheres[:, 3]])):
+                return point
+    return start
+
+
 def ahead(yaw: float) -> Vector:
     """The horizontal direction of an angle, rad."""
     return np.array([np.cos(yaw), np.sin(yaw), 0.0])
@@ -130,6 +149,14 @@ def travel(hand: int, points: Sequence[Vector], quat, keeps: int = -1) -> Progra
         )
         for k, p in enumerate(points)
     ]
+
+
+def turn_at(world: PlannedWorld, hand: int, point: Vector, quat, keeps: int = -1) -> Program:
+    """Phases in which a hand goes to a point, and turns there."""
+    there = Phase(hand=hand, pos=vector3(point), quat=quat, keeps=keeps, tolerance=0.05, limit=30, after="")
+    if np.linalg.norm(point - world.grip(hand)) < 0.04:
+        return [there]
+    return [dataclasses.replace(there, quat=None), there]
 
 
 def carry(world: PlannedWorld, hand: int, keeps: int = -1, name: str = "") -> Phase:

@@ -107,6 +107,13 @@ class Occupancy:
             self._draw(found, _between(self._placed_still[piece], low, high))
         return found
 
+    def still(self, low: float, high: float) -> Bool[np.ndarray, "h w"]:
+        """Cells that things which cannot move take between two heights, m."""
+        found = np.zeros(self.shape, bool)
+        for band in _bands(low, high):
+            found |= self._taken_by_still(*band)
+        return found
+
     def taken(
         self, view: PhysicsView, low: float, high: float, without: Collection[int] = (), world: int = 0
     ) -> Bool[np.ndarray, "h w"]:

@@ -174,10 +174,12 @@ class _JointPlan:
     pulls: bool
 
 
-def _ways(joint: OpenableJoint, value: bool, to: float = OPEN_TO) -> list[tuple[tuple[FaceGrip, ...], float, bool]]:
+def _ways(
+    joint: OpenableJoint, value: bool, to: float = OPEN_TO, between_rooms: bool = False
+) -> list[tuple[tuple[FaceGrip, ...], float, bool]]:
     """Grips, share of the joint's range to which they move it, and whether the hand pulls: a door is pulled open by its
     outer face or its edge, and pushed shut by its outer face. Where no floor is free before that, it is pulled by its
-    edge until it is nearly shut, or by its inner face until it is ajar."""
+    edge until it is nearly shut, or by its inner face until it is ajar; a door between rooms, until it is shut."""
     if value:
         return [(joint.grips, to, True), (joint.edges, to, True), (joint.inner_grips, to, False)]
     ways = [(joint.grips, 0.0, False)]
@@ -185,7 +187,9 @@ def _ways(joint: OpenableJoint, value: bool, to: float = OPEN_TO) -> list[tuple[
         ways.append((joint.edges, 0.0, True))
     elif joint.fraction > LAST + 0.1:
         ways.append((joint.edges, LAST, True))
-    if joint.hinge and joint.fraction > AJAR + 0.1:
+    if between_rooms:
+        ways.append((joint.inner_grips, 0.0, True))
+    elif joint.hinge and joint.fraction > AJAR + 0.1:
         ways.append((joint.inner_grips, AJAR, True))
     return [*ways, (joint.grips, 0.0, True)]
 
@@ -195,15 +199,15 @@ def _plan(
 ) -> _JointPlan | None:
     floor, obstacles = world.floor(), world.obstacles()
     passed = 0
-    for grips, fraction, pulls in _ways(joint, value, to):
+    between_rooms = world.domain.model.tables.object_categories[joint.object_index] == "door"
+    for grips, fraction, pulls in _ways(joint, value, to, between_rooms):
         count, sweep = 0, joint.sweep(fraction)[:, :2]
         for grip in grips:
             places = joint.path(grip, fraction)
             first, normal = places[0]
-            for stance in stances(world, hand, places[len(places) // 2][0], floor, AWAY, most=STANCES):
-                upright = grips is not joint.edges and float(np.linalg.norm(normal[:2])) > UPRIGHT
-                if upright and (np.array(stance.xy) - first[:2]) @ normal[:2] <= 0.0:
-                    continue  # the robot stands behind the face
+            upright = grips is not joint.edges and float(np.linalg.norm(normal[:2])) > UPRIGHT
+            middle, face = places[len(places) // 2][0], (first, normal) if upright else None
+            for stance in stances(world, hand, middle, floor, AWAY, most=STANCES, before=face):
                 if np.linalg.norm(sweep - np.array(stance.xy), axis=1).min() < STAND_OFF:
                     continue
                 if not all(world.reaches(hand, stance, p) for p, _ in places):

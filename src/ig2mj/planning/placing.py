@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+import dataclasses
+from collections.abc import Callable, Generator, Iterator, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.arm_orientations import points_ahead
-from ig2mj.planning.clearance import Obstacles, straight
+from ig2mj.planning.clearance import HELD, Obstacles, straight
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp
 from ig2mj.planning.moves import (
@@ -27,6 +28,8 @@ from ig2mj.planning.moves import (
     quaternion,
     rest,
     travel,
+    turn_at,
+    turning_point,
     vector3,
 )
 from ig2mj.planning.opening import Tried, open_into
@@ -35,12 +38,21 @@ from ig2mj.planning.spots import Spot, grip_for, spots_for
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import PlannedWorld, Stance, Vector
+from ig2mj.sampling.conditions import Condition
 
 SPARE = 0.03
 """m before its place from which on an object may touch what is around."""
 
 DEEP = 0.4
 """m above a spot in a container that is open above, from which an object is let down to it."""
+
+LOW_DROPS, DEEP_DROPS = (0.0, 0.05, 0.1), (0.0, 0.05, 0.1, 0.16, 0.22, 0.28, 0.35, 0.42)
+"""m above its place at which an object is let go where the hand has no room lower: onto something, and into it."""
+
+DROPS = {"inside": DEEP_DROPS, "on_top": LOW_DROPS, "on_floor": LOW_DROPS, "next_to": LOW_DROPS, "under": (0.0,)}
+
+FALLS_OVER, FALLING = ("on_floor", "on_top", "inside"), 15
+"""Placements that stay true where an object falls over, and agent steps that it falls."""
 
 STANCES, WAYS, ARM_WAYS = 3, 30, 200
 """Stances for each spot, and ways of a hand that are looked for, at most: of one that floats, and of one on an arm."""
@@ -65,7 +77,12 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 if not again.done:
                     break
             hand = hand_with(world, name)
-            found = _plan(world, predicate, name, where, hand)
+            narrowed = bool(step.also)
+            found = _plan(world, predicate, name, where, hand, step.also)
+            if isinstance(found, str) and narrowed:
+                narrowed, found = False, _plan(world, predicate, name, where, hand)
+            if found == _NO_WAY and predicate in FALLS_OVER:
+                found = _plan(world, predicate, name, where, hand, hanging=True)
             if isinstance(found, str):
                 reason = "no_path" if found == _NO_WAY else "no_base"
                 detail = f"{found} {predicate}({name}, {where}) would be true"
@@ -84,19 +101,19 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             _, yaw = world.base
             target, quat, rotation = grip_for(world, hand, name, spot)
             fingers, palm = world.hand_axes(hand, rotation)
-            target = target + LET_GO * UP
+            target = target + (LET_GO + spot.drop) * UP
             spheres = world.spheres(fingers, palm, holding=name, hand=hand, rotation=rotation)
             obstacles = world.obstacles([name], world.stance)
             follows = world.follows(hand, quat, obstacles)
             back = [UP, -ahead(yaw)]
-            way = hand_path(obstacles, spheres, world.grip(hand), target, back, SPARE, True, follows)
+            start = turning_point(obstacles, spheres, world.grip(hand), yaw)
+            way = hand_path(obstacles, spheres, start, target, back, SPARE, True, follows)
             if way is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
             keeps, turned = world.index(name), quaternion(quat)
             reason = yield [
-                Phase(hand=hand, pos=vector3(world.grip(hand)), quat=turned, keeps=keeps, tolerance=0.05, limit=30,
-                      after=""),
+                *turn_at(world, hand, start, turned, keeps),
                 *travel(hand, way, turned, keeps=keeps),
                 Phase(hand=hand, pos=vector3(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1,
                       limit=20, after="", speed=0.03),
@@ -104,11 +121,18 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 Phase(hand=hand, pos=vector3(target - RETREAT * palm), tolerance=0.04, limit=15, after=""),
                 *travel(hand, way[-2::-1], None),
                 *rest(hand),
-                Phase(until=Until.WAITED, limit=6),
+                Phase(until=Until.WAITED, limit=6 if spot.drop == 0.0 else FALLING),
             ]  # fmt: skip
-            if world.facts.holds(until or predicate, name, where):
+            facts = world.facts
+            if not facts.holds(until or predicate, name, where):
+                reason, detail = reason or "not_true_after", f"{name} is not where it was put"
+                continue
+            lacking = [c for c in step.also if facts.holds(c.predicate, *c.arguments) != c.value]
+            if not lacking:
                 return Outcome(attempts=attempt + 1)
-            reason, detail = reason or "not_true_after", f"{name} is not where it was put"
+            reason, detail = "not_true_after", f"{name} was put there, and {lacking[0]} is false"
+            if not narrowed or attempt > 0:
+                break
         return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
     return place
@@ -135,6 +159,19 @@ def _has_room(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], goal: Vec
     return any(obstacles.clear(np.column_stack([spheres[:, :3] + point, spheres[:, 3]])) for point in points)
 
 
+def _drop(
+    obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], goal: Vector, drops: Sequence[float]
+) -> float | None:
+    """The least of some heights above a place at which the hand has room, and from where what it holds falls freely to
+    the place, m; None: there is none."""
+    held = spheres[spheres[:, 3] < HELD]
+    for drop in drops:
+        if _has_room(obstacles, spheres, goal + drop * UP):
+            free = drop == 0.0 or straight(obstacles, held, goal + drop * UP, goal + OVER * UP)
+            return drop if free else None
+    return None
+
+
 def bring_out(world: PlannedWorld, name: str) -> Primitive:
     """Puts an object onto open floor of the room where it is."""
     if name not in world.held:
@@ -148,27 +185,44 @@ _NO_SPOT, _NO_STANCE = "there is no room for a place where", "no free floor is i
 _NO_WAY = "the hand has no way to a place where"
 
 
-def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int) -> tuple[Stance, Spot] | str:
-    """A stance and a pose of the object's main body, of those with a way for the hand; else what is lacking."""
+def _plan(
+    world: PlannedWorld,
+    predicate: str,
+    name: str,
+    where: str,
+    hand: int,
+    also: Sequence[Condition] = (),
+    hanging: bool = False,
+) -> tuple[Stance, Spot] | str:
+    """A stance and a pose of the object's main body, of those with a way for the hand; else what is lacking.
+
+    Args:
+      also: further placements that are to be true. hanging: see `PlannedWorld.spots`.
+    """
     obstacles, floor = world.obstacles([name]), world.floor()
     lacking, seen = _NO_SPOT, list[Stance]()
 
     def spots() -> Iterator[tuple[Spot, Vector, np.ndarray]]:
-        """Spots with room for the hand, with its grasp point and spheres; those that are open above, and that the hand
-        cannot be let down to, at last."""
+        """Spots with room for the hand, with its grasp point and spheres; those above which the object is dropped come
+        later, and those that are open above, and that the hand cannot be let down to, at last."""
         nonlocal lacking
-        last = []
-        for spot in spots_for(world, predicate, name, where):
+        later, last = [], []
+        for spot in spots_for(world, predicate, name, where, also, hanging):
             target, _, rotation = grip_for(world, hand, name, spot)
             spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
             lacking = _NO_WAY if lacking == _NO_SPOT else lacking
-            if not _has_room(obstacles, spheres, target + LET_GO * UP):
+            drop = _drop(obstacles, spheres, target + LET_GO * UP, DROPS[predicate])
+            if drop is None:
                 continue
-            found, over = (spot, target, spheres), target + (LET_GO + OVER) * UP
-            if predicate == "inside" and not spot.roofed and not straight(obstacles, spheres, over + DEEP * UP, over):
+            target = target + drop * UP
+            found, over = (dataclasses.replace(spot, drop=drop), target, spheres), target + (LET_GO + OVER) * UP
+            if drop > 0.0:
+                later.append(found)
+            elif predicate == "inside" and not spot.roofed and not straight(obstacles, spheres, over + DEEP * UP, over):
                 last.append(found)
             else:
                 yield found
+        yield from sorted(later, key=lambda found: found[0].drop)
         yield from last
 
     def candidates() -> Iterator[tuple[Stance, Spot]]:
@@ -186,10 +240,11 @@ def _plan(world: PlannedWorld, predicate: str, name: str, where: str, hand: int)
         stance, spot = candidate
         target, quat, rotation = grip_for(world, hand, name, spot)
         spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
-        start, back = world.carried(hand, stance), [UP, -ahead(stance.yaw)]
-        standing = obstacles.about(stance.xy, *world.body.trunk)
+        back, standing = [UP, -ahead(stance.yaw)], obstacles.about(stance.xy, *world.body.trunk)
+        start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
         follows = world.follows(hand, quat, standing, stance)
-        return hand_path(standing, spheres, start, target + LET_GO * UP, back, SPARE, search, follows) is not None
+        goal = target + (LET_GO + spot.drop) * UP
+        return hand_path(standing, spheres, start, goal, back, SPARE, search, follows) is not None
 
     most = WAYS if world.body.opening is None else ARM_WAYS
     return first_way(candidates(), has_way, most) or lacking

@@ -18,7 +18,7 @@ from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.quality import quality
 from ig2mj.sampling.conditions import Condition
 
-MOST_STEPS, EXTRA_STEPS = 4, 12
+MOST_STEPS, EXTRA_STEPS = 4, 20
 """An episode ends after so many times the steps of its first plan, and so many more."""
 
 
@@ -68,8 +68,21 @@ class _Episode:
     replans: int = 0
     records: list[StepRecord] = dataclasses.field(default_factory=list)
     failed: collections.Counter[Condition] = dataclasses.field(default_factory=collections.Counter)
+    failed_steps: collections.Counter[str] = dataclasses.field(default_factory=collections.Counter)
+    stuck: set[Condition] = dataclasses.field(default_factory=set)
     since: float = 0.0
     result: EpisodeResult | None = None
+
+    def learn(self, step: Step, outcome: Outcome) -> None:
+        """Remembers what failed, and what failed in the world as it is now: a step that succeeds changes it."""
+        if outcome.done:
+            if step.primitive not in ("navigate_to", "release"):
+                self.stuck.clear()
+            return
+        self.failed_steps[str(step)] += 1
+        if step.serves is not None:
+            self.failed[step.serves] += 1
+            self.stuck.add(step.serves)
 
 
 def solve(
@@ -144,8 +157,7 @@ class Solving:
             assert episode.plan is not None
             step = episode.plan.steps[0]
             episode.records.append(StepRecord(step, outcome, time.monotonic() - episode.since))
-            if not outcome.done and step.serves is not None:
-                episode.failed[step.serves] += 1
+            episode.learn(step, outcome)
             self._next(world, episode)
 
     def _next(self, world: int, episode: _Episode) -> None:
@@ -157,7 +169,7 @@ class Solving:
         last = episode.records[-1] if episode.records else None
         begun = last.step.serves if last is not None and last.outcome.done else None
         try:
-            plan = planner.plan(facts, episode.failed, begun)
+            plan = planner.plan(facts, episode.failed, begun, episode.stuck, episode.failed_steps)
         except PlanningError as e:
             if episode.plan is None:
                 raise

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -17,9 +17,9 @@ from ig2mj.planning.facts import Facts
 from ig2mj.planning.free_floor import NEAR_START
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.world import PlannedWorld, Rotation, Vector
-from ig2mj.predicates.literals import room_index
+from ig2mj.sampling.areas import WITHOUT_CONTACT, areas_for
+from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.placement import Placer
-from ig2mj.sampling.rules import PLACEMENTS
 
 EASY = 0.35
 """m, horizontal, from the floor where a robot can stand up to which no spot is harder to reach than another."""
@@ -45,20 +45,35 @@ UP = np.array([0.0, 0.0, 1.0])
 @dataclasses.dataclass(frozen=True, eq=False)
 class Spot:
     """Where an object is to be: position (m) and orientation (w-x-y-z) of its main body, world frame; `roofed`: inside
-    something, with a part of it above."""
+    something, with a part of it above; `drop`: m above it at which the hand lets go."""
 
     pos: Vector
     quat: Float[np.ndarray, "4"]
     roofed: bool = False
+    drop: float = 0.0
 
 
-def spots_for(world: PlannedWorld, predicate: str, name: str, where: str) -> Iterator[Spot]:
+def spots_for(
+    world: PlannedWorld,
+    predicate: str,
+    name: str,
+    where: str,
+    also: Sequence[Condition] = (),
+    hanging: bool = False,
+) -> Iterator[Spot]:
     """Poses of an object's main body that make a placement true. Orientations in which it rests come first, those
-    nearest to how it is held before others, each turned about the vertical."""
+    nearest to how it is held before others, each turned about the vertical.
+
+    Args:
+      also: further placements that are to be true there.
+      hanging: at these places the object keeps the orientation in which it hangs from the hand, turned about the
+        vertical, with its lowest point where it would stand: it falls over when it is let go.
+    """
     world.query.load(world.stage.snapshot(world.world))
     index = world.index(name)
-    second = room_index(world.domain.model, where) if predicate == "on_floor" else world.index(where)
-    areas = PLACEMENTS[predicate](world.query, index, second)
+    requested = [Condition(predicate, (name, where)), *also]
+    areas = areas_for(world.query, world.domain.model, name, [c for c in requested if c.value])
+    without_contact = [c for c in requested if c.predicate in WITHOUT_CONTACT]
     placer, farther = Placer(world.query), _out_of_reach(world)
     middle = _middle_of_fixed_part(world, where) if predicate == "inside" else None
     around = world.obstacles([name])
@@ -83,9 +98,10 @@ def spots_for(world: PlannedWorld, predicate: str, name: str, where: str) -> Ite
                 if any(np.linalg.norm(pos - other) < SPREAD for other in found):
                     continue
                 asked += 1
-                if predicate in ("on_top", "on_floor") or _would_hold(world, predicate, name, where, pos, new):
+                at, turn = _hanging(world, name, pos, new, angle) if hanging else (pos, new)
+                if not without_contact or _would_hold(world, without_contact, name, at, turn):
                     found.append(pos)
-                    yield Spot(pos, new, bool(roofed[k]))
+                    yield Spot(at, turn, bool(roofed[k]))
             if found:
                 break
 
@@ -98,6 +114,20 @@ def grip_for(world: PlannedWorld, hand: int, name: str, spot: Spot) -> tuple[Vec
     rotation = matrices_on_host(turn[None])[0]
     target = spot.pos + rotation @ (world.grip(hand) - own_pos)
     return target, np.asarray(quat_multiply(turn, world.hand_quat(hand)), float), rotation
+
+
+def _hanging(
+    world: PlannedWorld, name: str, pos: Vector, quat: Float[np.ndarray, "4"], angle: float
+) -> tuple[Vector, Float[np.ndarray, "4"]]:
+    """Pose of an object that is turned as it is now, but for an angle about the vertical, above where it would rest at
+    a pose: the middle of its box there, its lowest point as low."""
+    own_pos, own_quat = world.pose(name)
+    corners = (world.vertices(name) - own_pos) @ matrices_on_host(own_quat[None])[0]
+    turn = _yawed(own_quat, angle)
+    there = corners @ matrices_on_host(quat[None])[0].T
+    hung = corners @ matrices_on_host(turn[None])[0].T
+    middle = pos[:2] + (there.min(0) + there.max(0))[:2] / 2 - (hung.min(0) + hung.max(0))[:2] / 2
+    return np.array([*middle, pos[2] + there[:, 2].min() - hung[:, 2].min()]), turn
 
 
 def _roofed(world: PlannedWorld, positions: Float[np.ndarray, "n 3"], around: Obstacles) -> Bool[np.ndarray, "n"]:
@@ -161,14 +191,16 @@ def _upright(world: PlannedWorld, name: str) -> list[Float[np.ndarray, "4"]]:
     return kept or [now]
 
 
-def _would_hold(world: PlannedWorld, predicate: str, name: str, where: str, pos: Vector, quat: np.ndarray) -> bool:
-    """Whether a placement that does not depend on contact would be true."""
+def _would_hold(
+    world: PlannedWorld, conditions: Sequence[Condition], name: str, pos: Vector, quat: Float[np.ndarray, "4"]
+) -> bool:
+    """Whether placements that do not depend on contact would be true."""
     before = world.query.save()
     world.query.place(world.index(name), pos, quat)
     states = Facts(world.domain, world.stage.states, world.view, world.world).states
-    holds = Facts(world.domain, states, world.query.view).holds(predicate, name, where)
+    truth = Facts(world.domain, states, world.query.view).truth([c.atom for c in conditions])
     world.query.load(before)
-    return holds
+    return all(truth[c.atom] == c.value for c in conditions)
 
 
 def _yawed(quat: Float[np.ndarray, "4"], angle: float) -> Float[np.ndarray, "4"]:

@@ -37,6 +37,7 @@ def stances(
     away: float,
     most: int = 10,
     held: Vector | None = None,
+    before: tuple[Vector, Vector] | None = None,
 ) -> Iterator[Stance]:
     """Where the robot can stand so that a hand reaches a point, the nearest and most comfortable first.
 
@@ -44,6 +45,7 @@ def stances(
       away: m, horizontal, that the base would like to be from the point.
       held: what is brought to the point is a part of what the hand holds, and this leads from it to the hand's
         grasp point, m, in the body's frame.
+      before: point and normal of a face that the robot stands in front of.
     """
     here, _ = world.base
     side = world.body.carry[hand][1]
@@ -62,6 +64,8 @@ def stances(
     target = point if held is None else point + _turned_vectors(yaw, held)
     rise = _rise_from(world, hand, middles, yaw, target)
     cost += np.where(np.isnan(rise), np.inf, EFFORT * np.abs(rise))
+    if before is not None:
+        cost[(middles - before[0][:2]) @ before[1][:2] <= 0.0] = np.inf
     count, obstacles = 0, world.obstacles()
     while len(cost) and np.isfinite(cost[best := int(np.argmin(cost))]):
         if behind_wall(world, obstacles, middles[best], point) or not _stretches(

@@ -7,15 +7,18 @@ taken before it cuts, hands that are full put something down. Steps that failed 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from ig2mj.planning.domain import SYMMETRIC
+from ig2mj.planning.domain import SYMMETRIC, HeatSource
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.step_order import LATER, ordered
 from ig2mj.planning.steps import PLACE, Step
 from ig2mj.sampling.conditions import Condition
+
+CLEARED = 2
+"""Failures of bringing a container out onto the floor after which it is left where it is."""
 
 
 class StepBuilder:
@@ -28,12 +31,15 @@ class StepBuilder:
         missing: Sequence[Condition],
         failed: Mapping[Condition, int],
         begun: Condition | None = None,
+        stuck: Collection[Condition] = (),
+        failed_steps: Mapping[str, int] | None = None,
     ):
         """
         Args:
-          required, missing, failed: see `TaskPlan`, `TaskPlanner.plan`. begun: condition that the last step was for.
+          required, missing, failed, begun, stuck, failed_steps: see `TaskPlan`, `TaskPlanner.plan`.
         """
         self._facts, self._domain, self._failed = facts, facts.domain, failed
+        self._failed_steps = failed_steps or {}
         self._required, self._begun = required, begun
         self.steps: list[Step] = []
         self._held = list(facts.held)
@@ -41,7 +47,7 @@ class StepBuilder:
         self._on: dict[str, bool] = {}
         self._wet: set[str] = set()
         self._inside: dict[str, tuple[str, ...]] = {}
-        for condition in ordered(missing, failed, self._held, self._tool, self._domain, begun):
+        for condition in ordered(missing, failed, self._held, self._tool, self._domain, begun, stuck):
             self._serves = condition
             self._make(condition)
         for condition in required:  # what the steps themselves made false
@@ -102,8 +108,13 @@ class StepBuilder:
             tools = [t for t in tools if self._domain.has(t, "soakable") or self._facts.holds("soaked", t)]
         named = {a for w in self._required for a in w.arguments}
 
+        uses = {"sliced": "slice", "stained": "scrub", "dusty": "wipe"}[c.predicate]
+        taps = self._domain.taps if c.predicate == "stained" else ()
+
         def rank(tool: str) -> tuple:
             return (
+                self._failures(("grasp", tool), *(("soak", tool, tap) for tap in taps))
+                + self._failures((uses, c.arguments[0], tool)) // 2,
                 tool not in self._held,
                 c.predicate == "stained" and not self._soaked(tool),
                 bool(self._shut_in(tool)),
@@ -111,7 +122,11 @@ class StepBuilder:
                 tools.index(tool),
             )
 
-        return sorted(tools, key=rank)[self._failed.get(c, 0) // 2 % len(tools)]
+        return min(tools, key=rank)
+
+    def _failures(self, *steps: tuple[str, ...]) -> int:
+        """How often steps have failed, each given by its primitive and arguments."""
+        return sum(self._failed_steps.get(" ".join(step), 0) for step in steps)
 
     def _soaked(self, name: str) -> bool:
         return name in self._wet or self._facts.holds("soaked", name)
@@ -141,10 +156,12 @@ class StepBuilder:
         self._add("open" if value else "close", name)
         self._open[name] = value
 
-    def _switch(self, name: str, value: bool) -> None:
+    def _switch(self, name: str, value: bool, keep: str = "") -> None:
         if self._is_on(name) == value or not self._domain.has(name, "toggleable"):
             return
         self._reach(name)
+        if name not in self._held:
+            self._free_hand(keep)
         self._add("toggle_on" if value else "toggle_off", name)
         self._on[name] = value
 
@@ -161,10 +178,35 @@ class StepBuilder:
         if name in self._held:
             return
         self._reach(name)
+        if self._failures(("grasp", name)):
+            self._clear_out(self._loose_container(name))
         self._free_hand()
         self._add("grasp", name)
         self._held.append(name)
         self._inside[name] = ()
+
+    def _loose_container(self, name: str) -> str:
+        """What can be carried and an object is inside of; "" for nothing."""
+        middle = self._facts.place(name)
+        for other in self._domain.loose:
+            low, high = self._facts.box(other)
+            around = (low <= middle).all() and (middle <= high).all()
+            if other != name and around and self._facts.holds("inside", name, other):
+                return other
+        return ""
+
+    def _clear_out(self, container: str) -> None:
+        """Puts a container that can be carried onto open floor, where hands reach into it from all sides, if it is not
+        on the floor yet and this has not failed."""
+        if not container or self._domain.fixed(container) or container in self._held:
+            return
+        room = self._facts.room(container)
+        if not self._domain.graspable(container) or self._facts.holds("on_floor", container, room):
+            return
+        if self._failures(("grasp", container), ("place_on_floor", container, room)) >= CLEARED:
+            return
+        self._take(container)
+        self._put("place_on_floor", container, room)
 
     def _put(self, primitive: str, name: str, where: str, also: tuple[Condition, ...] = ()) -> None:
         self._add(primitive, name, where, also=also)
@@ -174,15 +216,16 @@ class StepBuilder:
             self._inside[name] = (where, *(self._inside.get(where) or ()))
 
     def _soak(self, name: str) -> None:
-        tap = self._nearest(self._domain.taps, name)
-        self._switch(tap, True)
+        taps = self._domain.taps
+        far = {t: float(np.linalg.norm(self._facts.place(t) - self._facts.place(name))) for t in taps}
+        tap = min(taps, key=lambda t: (self._failures(("toggle_on", t), ("soak", name, t)), far[t]))
+        self._switch(tap, True, keep=name)
         self._take(name)
         self._add("soak", name, tap)
         self._wet.add(name)
 
     def _cook(self, name: str) -> None:
-        choices = self._domain.heaters(name)
-        source = choices[self._failed.get(self._serves, 0) // 2 % len(choices)]
+        source = self._source("cook", name, self._domain.heaters(name))
         was_on = self._is_on(source.name) if source.needs_switch else True
         if source.acts_inside:
             self._put_in(name, source.name, source.needs_closed)
@@ -195,12 +238,20 @@ class StepBuilder:
             self._switch(source.name, False)
 
     def _freeze(self, name: str) -> None:
-        choices = self._domain.coolers(name)
-        source = choices[self._failed.get(self._serves, 0) // 2 % len(choices)]
+        source = self._source("freeze", name, self._domain.coolers(name))
         self._put_in(name, source.name, source.needs_closed)
         if source.needs_switch:
             self._switch(source.name, True)
         self._add("freeze", name, source.name)
+
+    def _source(self, primitive: str, name: str, sources: Sequence[HeatSource]) -> HeatSource:
+        """The source of heat or cold with which fewest steps have failed."""
+
+        def failures(source: HeatSource) -> int:
+            own = [(p, source.name) for p in ("open", "close", "toggle_on")]
+            return self._failures(*own, ("place_inside", name, source.name), (primitive, name, source.name))
+
+        return min(sources, key=failures)
 
     def _put_in(self, name: str, container: str, close: bool) -> None:
         """Puts an object into a container and shuts it."""
@@ -242,6 +293,8 @@ class StepBuilder:
                 self._free_hand()
                 self._put("push", name, target, rules[1:])
                 continue
+            if rule.predicate == "inside" and self._failures(("place_inside", name, target)):
+                self._clear_out(target)
             crowding = self._crowding(rule, c)
             if crowding is not None:
                 self._take(crowding.arguments[0])
@@ -319,7 +372,3 @@ class StepBuilder:
             self._put("place_on_top", name, near[count // 2 % len(near)], (gone,))
         else:
             self._put("place_on_floor", name, self._facts.room(name), (gone,))
-
-    def _nearest(self, names: Sequence[str], to: str) -> str:
-        near = sorted(names, key=lambda n: float(np.linalg.norm(self._facts.place(n) - self._facts.place(to))))
-        return near[self._failed.get(self._serves, 0) // 2 % len(near)]

@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from ig2mj.planning.domain import Domain, condition_of
 from ig2mj.planning.exclusion import incompatible
@@ -76,13 +76,20 @@ class TaskPlanner:
         self._impossible: dict[Condition, str] = {}
 
     def plan(
-        self, facts: Facts, failed: Mapping[Condition, int] | None = None, begun: Condition | None = None
+        self,
+        facts: Facts,
+        failed: Mapping[Condition, int] | None = None,
+        begun: Condition | None = None,
+        stuck: Collection[Condition] = (),
+        failed_steps: Mapping[str, int] | None = None,
     ) -> TaskPlan:
         """The steps that are left.
 
         Args:
           failed: how often the steps of a condition have failed.
           begun: condition that the last step was for, if that step succeeded.
+          stuck: conditions whose steps failed in the world as it is now: no step has succeeded since.
+          failed_steps: how often steps have failed, by their text.
 
         Raises:
           PlanningError: the goal cannot become true; names the literal and the reason.
@@ -105,7 +112,9 @@ class TaskPlanner:
             raise PlanningError(f"the goal cannot become true: {self._why_not(truth, cost, together)}")
         required = tuple(condition_of(atom, required) for atom, required in reading.items())
         missing = tuple(condition_of(atom, required) for atom, required in reading.items() if truth[atom] != required)
-        return TaskPlan(tuple(StepBuilder(facts, required, missing, failed, begun).steps), missing, required)
+        return TaskPlan(
+            tuple(StepBuilder(facts, required, missing, failed, begun, stuck, failed_steps).steps), missing, required
+        )
 
     def _reason(self, condition: Condition) -> str:
         if condition not in self._impossible:

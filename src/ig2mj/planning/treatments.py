@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+import dataclasses
+from collections.abc import Callable, Generator, Iterator, Sequence
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from ig2mj.planning.moves import (
     hand_path,
     hand_with,
     travel,
+    turn_at,
+    turning_point,
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
@@ -41,42 +44,61 @@ def _wait(
     return "" if world.facts.holds(predicate, name) else "not_true_after"
 
 
-WAIT, SOAKING, COOKING, FREEZING = 1.0, 20.0, 90.0, 200.0
+WAIT, SOAKING, COOKING, FREEZING = 1.0, 8.0, 90.0, 200.0
 """s between looks at a predicate; s that a tap, a source of heat and one of cold are given."""
 
 
-def _hold_at(
-    world: PlannedWorld, name: str, hand: int, points: Sequence[Vector], link: int = -1
-) -> Generator[Program, str, tuple[str, list[Vector]]]:
-    """Brings a held object's centre of mass, or an annotated link of it, to the first of some points that the hand has
-    a way to, with the robot standing anywhere; returns the reason why it did not, and the way."""
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Hold:
+    """A part of a held object at a point: the point, the way from there to the hand's grasp point, and the rotation by
+    which the hand is turned; both of these as the robot faces now. number: of those that are alike."""
 
+    point: Vector
+    offset: Vector
+    tilt: Rotation
+    number: int = 0
+
+
+def _hold_at(
+    world: PlannedWorld, name: str, hand: int, holds: Callable[[], Sequence[_Hold]]
+) -> Generator[Program, str, tuple[str, list[Vector], int]]:
+    """Holds an object in the first of some ways that the hand has a way to, with the robot standing anywhere; returns
+    the reason why it did not, the way, and the number of the hold.
+
+    Args:
+      holds: as the object is held now.
+    """
     for _ in range(ATTEMPTS):
         obstacles, floor, now = world.obstacles([name]), world.floor(), world.base[1]
-        offsets = _offsets(world, name, hand, link)
 
-        def candidates(floor=floor, now=now, offsets=offsets) -> Iterator[_Holding]:
-            for offset, tilt in offsets:
-                held = about_vertical(-now) @ offset
-                for point in points:
-                    for stance in stances(world, hand, point, floor, AWAY, STANCES, held):
-                        yield stance, point, offset, tilt
+        def candidates(floor=floor, now=now) -> Iterator[_Holding]:
+            for hold in holds():
+                held = about_vertical(-now) @ hold.offset
+                for stance in stances(world, hand, hold.point, floor, AWAY, STANCES, held):
+                    yield stance, hold
 
-        def has_way(candidate: _Holding, search: bool, obstacles=obstacles, now=now) -> bool:
-            stance, point, offset, tilt = candidate
+        def aim(stance: Stance, hold: _Hold, now=now) -> tuple[Vector, Rotation]:
             turn = about_vertical(stance.yaw - now)
-            spheres = _spheres(world, name, hand, turn @ tilt)
-            standing, start = obstacles.about(stance.xy, *world.body.trunk), world.carried(hand, stance)
-            target, back = point + turn @ offset, [UP, -ahead(stance.yaw)]
-            follows = world.follows(hand, world.turned_hand(hand, turn @ tilt), standing, stance)
+            return hold.point + turn @ hold.offset, turn @ hold.tilt
+
+        def has_way(candidate: _Holding, search: bool, obstacles=obstacles, aim=aim) -> bool:
+            stance, hold = candidate
+            target, turned = aim(stance, hold)
+            spheres = _spheres(world, name, hand, turned)
+            standing = obstacles.about(stance.xy, *world.body.trunk)
+            if not standing.clear(np.column_stack([spheres[:, :3] + target, spheres[:, 3]])):
+                return False
+            start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
+            back = [UP, -ahead(stance.yaw)]
+            follows = world.follows(hand, world.turned_hand(hand, turned), standing, stance)
             return hand_path(standing, spheres, start, target, back, search=search, follows=follows) is not None
 
         found = first_way(candidates(), has_way, WAYS)
         if found is None:
-            return "no_path", []
-        stance, point, offset, tilt = found
-        target = point + about_vertical(stance.yaw - now) @ offset
-        turned = about_vertical(stance.yaw - now) @ tilt @ about_vertical(now - stance.yaw)
+            return "no_path", [], -1
+        stance, hold = found
+        target, turned = aim(stance, hold)
+        turned = turned @ about_vertical(now - stance.yaw)
         if (yield from go(world, stance)):
             continue
         back, obstacles = [UP, -ahead(world.base[1])], world.obstacles([name], world.stance)
@@ -84,13 +106,40 @@ def _hold_at(
             _spheres(world, name, hand, turned),
             world.follows(hand, world.turned_hand(hand, turned), obstacles),
         )
-        way = hand_path(obstacles, spheres, world.grip(hand), target, back, search=True, follows=follows)
+        start = turning_point(obstacles, spheres, world.grip(hand), world.base[1])
+        way = hand_path(obstacles, spheres, start, target, back, search=True, follows=follows)
         if way is not None:
             quat, keeps = world.turned_hand(hand, turned), world.index(name)
-            turns = Phase(hand=hand, pos=vector3(world.grip(hand)), quat=quat, keeps=keeps, tolerance=0.05, limit=30,
-                          after="")  # fmt: skip
-            return (yield [turns, *travel(hand, way, quat, keeps=keeps)]), way
-    return "no_path", []
+            reason = yield [*turn_at(world, hand, start, quat, keeps), *travel(hand, way, quat, keeps=keeps)]
+            return reason, way, hold.number
+    return "no_path", [], -1
+
+
+def _holds_at(world: PlannedWorld, name: str, hand: int, points: Sequence[Vector], link: int = -1) -> list[_Hold]:
+    """A held object's centre of mass and parts, or an annotated link of it, at some points."""
+    return [_Hold(point, o, tilt) for o, tilt in _offsets(world, name, hand, link) for point in points]
+
+
+def _holds_below(world: PlannedWorld, name: str, hand: int, source: Vector) -> list[_Hold]:
+    """Parts of a held object below a source of water, as it is held and pointing ahead, level and downwards, so that it
+    reaches into a basin over its rim."""
+    grip, out = world.grip(hand), ahead(world.base[1])
+    points, centre = world.points(name) - grip, world.com(name) - grip
+    axis = centre / np.linalg.norm(centre) if np.linalg.norm(centre) > LONG else world.hand_axes(hand)[1]
+    tilts = [np.eye(3), *(turn_onto(axis, np.cos(a) * out - np.sin(a) * UP) for a in PITCHES)]
+    found = list[_Hold]()
+    for number, tilt in enumerate(tilts):
+        turned, middle = points @ tilt.T, tilt @ centre
+        along = out if number == 0 else tilt @ axis
+        far = max(float(((turned - middle) @ along).max()), 0.0)
+        for share in PARTS:
+            part = middle + share * far * along
+            over = turned[np.linalg.norm((turned - part)[:, :2], axis=1) < COLUMN]
+            top = float((over - part)[:, 2].max()) if len(over) else 0.0
+            for below in BELOW_TAP:
+                at = source - (below + max(top, 0.0)) * UP
+                found.append(_Hold(at, -part, tilt, len(PARTS) * number + PARTS.index(share)))
+    return found
 
 
 def _spheres(world: PlannedWorld, name: str, hand: int, rotation: Rotation) -> np.ndarray:
@@ -115,15 +164,17 @@ def _offsets(world: PlannedWorld, name: str, hand: int, link: int) -> list[tuple
     return found
 
 
-_Holding = tuple[Stance, Vector, Vector, Rotation]
-"""Where the robot stands, where a part of what it holds is to be, the way from there to the hand, and how it is
-turned."""
+_Holding = tuple[Stance, _Hold]
+"""Where the robot stands, and how it holds what it holds."""
 
 LONG = 0.07
 """m from the hand to the centre of mass of what it holds, from which on that is also held so that it points ahead."""
 
 PARTS = (0.0, 0.6, 0.85)
 """Parts of a held object that are tried: shares of the way from its centre of mass to its end away from the robot."""
+
+PITCHES, COLUMN = (0.0, 0.5, 0.9, 1.3), 0.03
+"""rad by which what is held below a tap points down ahead of the hand; m about a part within which drops meet it."""
 
 STANCES, WAYS = 4, 60
 """Stances for each point, and ways of a hand that are looked for, at most."""
@@ -136,21 +187,25 @@ def soak(world: PlannedWorld, step: Step) -> Primitive:
     tables = world.domain.model.tables
     links = np.flatnonzero((tables.link_object == world.index(tap)) & (tables.link_kind == LinkKind.WATER_SOURCE))
     source = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
-    half = float(np.ptp(world.vertices(name)[:, 2])) / 2
-    here, _ = world.base
-    back = np.array([*(here - source[:2]), 0.0])
-    back /= max(float(np.linalg.norm(back)), 1e-6)
-    points = [source - np.array([0, 0, below + half]) + out * back for out in (0.0, 0.05, 0.09) for below in BELOW_TAP]
-    reason, way = yield from _hold_at(world, name, hand, points)
-    if reason:
-        return Outcome(reason, f"the hand has no way with {name} below {tap}")
-    reason = yield from _wait(world, "soaked", name, SOAKING, world.index(name))
-    yield [*travel(hand, way[-2::-1], None), carry(world, hand)]
-    return Outcome(reason, f"{name} did not take enough water" if reason else "")
+    reason, number, failed = "", -1, set[int]()
+    for _ in range(SOAKS):
+        left = lambda: [h for h in _holds_below(world, name, hand, source) if h.number not in failed]  # noqa: E731
+        reason, way, number = yield from _hold_at(world, name, hand, left)
+        if number < 0:
+            return Outcome(reason, f"the hand has no way with {name} below {tap}")
+        reason = reason or (yield from _wait(world, "soaked", name, SOAKING, world.index(name)))
+        yield [*travel(hand, way[-2::-1], None), carry(world, hand)]
+        if world.facts.holds("soaked", name):
+            return Outcome()
+        failed.add(number)
+        if name not in world.held:
+            return Outcome("slipped", f"the hand lost {name}")
+    return Outcome(reason or "not_true_after", f"{name} did not take enough water")
 
 
-BELOW_TAP = (0.16, 0.12, 0.2, 0.08, 0.04)
-"""m below a source of water at which the top of what is soaked is held, so that the hand passes below the spout."""
+BELOW_TAP, SOAKS = (0.065, 0.1, 0.15), 3
+"""m below a source of water at which the top of what is soaked is held: drops begin 5 cm below it; and ways of holding
+it that are tried."""
 
 
 def cook(world: PlannedWorld, step: Step) -> Primitive:
@@ -168,7 +223,7 @@ def cook(world: PlannedWorld, step: Step) -> Primitive:
         link = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
         half = float(np.ptp(world.vertices(name)[:, 2])) / 2
         points = [link - (above + half) * DOWN for above in (0.06, 0.1, 0.14)]
-        reason, way = yield from _hold_at(world, name, hand, points)
+        reason, way, _ = yield from _hold_at(world, name, hand, lambda: _holds_at(world, name, hand, points))
         if reason:
             return Outcome(reason, f"the hand has no way with {name} over {source}")
     keeps = world.index(name) if hand >= 0 else -1
@@ -200,7 +255,9 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
         if knife not in world.held:
             return Outcome("slipped", f"the hand lost {knife}", attempts=attempt)
         top = np.array([*world.com(name)[:2], world.vertices(name)[:, 2].max()])
-        reason, way = yield from _hold_at(world, knife, hand, [top + CUT_ABOVE * -DOWN], int(links[0]))
+        points = [top + CUT_ABOVE * UP]
+        holds = lambda points=points: _holds_at(world, knife, hand, points, int(links[0]))  # noqa: E731
+        reason, way, _ = yield from _hold_at(world, knife, hand, holds)
         if reason:
             continue
         blade = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)

@@ -133,6 +133,10 @@ class PlannedWorld:
         """Centre of mass of an object."""
         return np.asarray(self.view.object_com)[self.world, self.index(name)].astype(float)
 
+    def mass(self, name: str) -> float:
+        """kg, of the whole object."""
+        return float(self.domain.model.tables.object_mass[self.index(name)])
+
     def obstacles(self, without: Collection[str] = (), at: Stance | None = None) -> Obstacles:
         """Pieces of everything but some objects; `at`: and the robot's body, if it stood there."""
         found = self.planner.obstacles(self.view, [self.index(n) for n in without], self.world)

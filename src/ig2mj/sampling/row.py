@@ -18,23 +18,14 @@ import numpy as np
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.writes import teleports
 from ig2mj.errors import StateError
-from ig2mj.predicates.literals import object_index, room_index
+from ig2mj.predicates.literals import object_index
+from ig2mj.sampling.areas import areas_for
 from ig2mj.sampling.attaching import attach, number_of
 from ig2mj.sampling.bystanders import Bystanders
 from ig2mj.sampling.conditions import Condition, order
 from ig2mj.sampling.joints import JointMover
-from ig2mj.sampling.placement import (
-    NOWHERE,
-    RESTING_PENETRATION,
-    Areas,
-    Budget,
-    Placer,
-    Rejections,
-    holding_at_once,
-)
+from ig2mj.sampling.placement import NOWHERE, RESTING_PENETRATION, Budget, Placer, Rejections
 from ig2mj.sampling.query import SceneQuery
-from ig2mj.sampling.rules import PLACEMENTS, elsewhere, next_to, on_floor
-from ig2mj.sampling.rules.borne_by import borne_by
 from ig2mj.sampling.setters import Change, set_by_name
 from ig2mj.sampling.truths import Truths
 from ig2mj.states.model import StateModel
@@ -48,9 +39,6 @@ OPENINGS = 12
 
 KEPT_TRUTHS = 256
 """Lists of conditions whose evaluation is kept."""
-
-WITHOUT_CONTACT = frozenset(("inside", "next_to", "under"))
-"""Placements that can be asked of an object that has not come to rest yet."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -218,7 +206,7 @@ class RowSampler:
             raise StateError(f"'{name}' is fixed: it cannot be moved so that {rule} becomes true")
         if not rule.value and self._holds(requested):
             return True
-        areas = self._areas(name, requested)
+        areas = areas_for(self.query, self.model, name, requested)
         before = self.query.save()
         along = -1
         if rule.value and rule.predicate != "on_floor":
@@ -270,31 +258,6 @@ class RowSampler:
             self.query.load(mover.before)
         return False
 
-    def _areas(self, name: str, requested: Sequence[Condition]) -> Areas:
-        """Where an object may be put: what the first condition proposes, narrowed by the others."""
-        index = object_index(self.model, name)
-        rule, others = _proposing(requested)
-        if rule.predicate == "on_floor":
-            second = room_index(self.model, rule.arguments[1])
-        else:
-            second = object_index(self.model, rule.other_than(name))
-        if rule.value and rule.predicate == "next_to":
-            areas = next_to.beside(self.query, second, None, looks=rule.arguments[0] == name)
-        else:
-            areas = (PLACEMENTS[rule.predicate] if rule.value else elsewhere.areas)(self.query, index, second)
-        for other in others:
-            if other.predicate == "on_floor":
-                areas = on_floor.within(areas, self.query, room_index(self.model, other.arguments[1]))
-            elif other.predicate == "next_to":
-                neighbour = object_index(self.model, other.other_than(name))
-                areas = next_to.narrowed(areas, self.query, neighbour, looks=other.arguments[0] == name)
-            elif rule.predicate == "next_to" and other.predicate in ("inside", "on_top"):
-                bearer = object_index(self.model, other.arguments[1])
-                areas = borne_by(areas, self.query, bearer, loose=other.predicate == "inside")
-        if rule.predicate == "next_to" and all(c.predicate in WITHOUT_CONTACT for c in requested):
-            return holding_at_once(areas)
-        return areas
-
     def _halves(self, whole: str) -> set[str]:
         names = self.model.tables.object_names
         return {names[h] for h in self.model.parameters.halves_of(object_index(self.model, whole))}
@@ -328,16 +291,6 @@ class RowSampler:
         if any(deepest[object_index(self.model, name)] > RESTING_PENETRATION for name in placed):
             return "stands in something at the end"
         return ""
-
-
-def _proposing(requested: Sequence[Condition]) -> tuple[Condition, list[Condition]]:
-    """The condition that proposes places, and those that narrow them: a neighbour says most precisely where."""
-    if not requested[0].value:
-        return requested[0], []
-    needed = [c for c in requested if c.value]
-    inner = any(c.predicate in ("inside", "on_top") for c in needed)
-    rule = next((c for c in needed if inner and c.predicate == "next_to"), needed[0])
-    return rule, [c for c in needed if c is not rule]
 
 
 def _volume(model: StateModel, index: int) -> float:
