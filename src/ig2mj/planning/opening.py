@@ -94,13 +94,22 @@ Tried = collections.Counter[str]
 
 def open_around(world: PlannedWorld, name: str, tried: Tried) -> Generator[Program, str, bool]:
     """Opens the drawer that an object is in, else doors in front of it, the nearest first; where all are open, shuts
-    drawers that it is not in. Returns whether there was one that has not been tried `TRIES` times."""
-    found = [j for c in world.facts.containers(name) if world.domain.opens(c) for j in joints_of(world, c)]
-    near = world.com(name)
+    drawers that it is not in, above one that it is in. Returns whether there was one that has not been tried `TRIES`
+    times."""
+    near, facts = world.com(name), world.facts
+    containers = [c for c in facts.containers(name) if world.domain.opens(c)]
+    found = [j for c in containers for j in joints_of(world, c)]
+    for other in world.domain.openable:  # what is in a drawer that is pulled out far may not count as inside
+        low, high = facts.box(other)
+        if other not in (name, *containers) and (low <= near).all() and (near <= high).all():
+            own = joints_of(world, other)
+            found += own if any(not j.hinge and j.surrounds(near) for j in own) else []
     found.sort(key=lambda j: float(np.linalg.norm(j.vertices.mean(0) - near)))
     around = [j for j in found if not j.hinge and j.surrounds(near)]
     opened = around or [j for j in found if j.hinge] or found
-    return (yield from _move_one(world, opened, [] if around else [j for j in found if not j.hinge], tried))
+    others = [j for j in found if not j.hinge and j not in around]
+    above = [j for j in others if float(j.vertices[:, 2].min()) > float(near[2])]
+    return (yield from _move_one(world, opened, above if around else others, tried))
 
 
 def open_into(world: PlannedWorld, where: str, tried: Tried) -> Generator[Program, str, bool]:
