@@ -30,6 +30,9 @@ EACH, SPREAD = 4, 0.04
 ROOFED, COLUMN = 1.0, np.arange(0.15, 0.8, 0.08)
 """m of way that a spot counts as farther which nothing can be let down to, and heights above it that are looked at."""
 
+WIDE = 0.8
+"""Share of the middle edge of an object's box that has to have room above a spot."""
+
 LATER_SPOTS = 12
 """Candidates of an area of which the predicate is asked, at most."""
 
@@ -77,6 +80,7 @@ def spots_for(
     placer, farther = Placer(world.query), _out_of_reach(world)
     middle = _middle_of_fixed_part(world, where) if predicate == "inside" else None
     around = world.obstacles([name])
+    wide = max(CORNER, WIDE * float(np.sort(np.ptp(world.vertices(name), axis=0))[1]) / 2)
     turned = [(quat, angle) for quat in _upright(world, name) for angle in TURNS]
     if world.body.opening is not None:
         level = level_orientations(world, name) if predicate in ("inside", "under") else []
@@ -89,7 +93,7 @@ def spots_for(
             cost = farther(positions)
             roofed = np.zeros(len(positions), bool)
             if middle is not None:  # below openings, and away from where doors shut
-                roofed = _roofed(world, positions, around)
+                roofed = _roofed(positions, around, wide)
                 cost += np.linalg.norm((positions - middle)[:, :2], axis=1) + ROOFED * roofed
             for k in np.argsort(cost, kind="stable"):
                 pos = positions[k]
@@ -130,12 +134,12 @@ def _hanging(
     return np.array([*middle, pos[2] + there[:, 2].min() - hung[:, 2].min()]), turn
 
 
-def _roofed(world: PlannedWorld, positions: Float[np.ndarray, "n 3"], around: Obstacles) -> Bool[np.ndarray, "n"]:
-    """Above which positions something is in the way of what is let down to them."""
+def _roofed(positions: Float[np.ndarray, "n 3"], around: Obstacles, wide: float) -> Bool[np.ndarray, "n"]:
+    """Above which positions something is in the way of what is let down to them, and is so wide (m, to each side)."""
     if not len(positions):
         return np.zeros(0, bool)
     points = positions[:, None] + np.stack([np.zeros(len(COLUMN)), np.zeros(len(COLUMN)), COLUMN], axis=1)
-    return np.any(around.distance(points.reshape(-1, 3)).reshape(points.shape[:2]) < CORNER, axis=1)
+    return np.any(around.distance(points.reshape(-1, 3)).reshape(points.shape[:2]) < wide, axis=1)
 
 
 def _out_of_reach(world: PlannedWorld) -> Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n"]]:
