@@ -184,6 +184,14 @@ class Snapshot:
         return self.whole("eq_data")
 
     @property
+    def mocap_pos(self) -> Float[Array, "*W M 3"]:
+        return self.whole("mocap_pos")
+
+    @property
+    def mocap_quat(self) -> Float[Array, "*W M 4"]:
+        return self.whole("mocap_quat")
+
+    @property
     def tree_asleep(self) -> Int[Array, "*W T"]:
         return self.whole("tree_asleep")
 
