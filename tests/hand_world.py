@@ -30,7 +30,7 @@ from ig2mj.states import (
     WorldState,
     update,
 )
-from ig2mj.states.parameters import Part, make_parameters
+from ig2mj.states.parameters import HalfPose, make_parameters
 
 UNIT_CUBE = (((0.0, 0.0, 0.0), (0.5, 0.5, 0.5)),)
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
@@ -101,7 +101,7 @@ class HandWorld:
 
     def _make_model(self, options: Mapping) -> StateModel:
         parts = [
-            Part(self.index[t.name], self.index[half], tuple(map(float, offset)), IDENTITY)
+            HalfPose(self.index[t.name], self.index[half], tuple(map(float, offset)), IDENTITY)
             for t in self.things
             for half, offset in t.parts.items()
         ]

@@ -23,7 +23,7 @@ from ig2mj.learn.collect import Transition
 from ig2mj.learn.dagger import DaggerConfig
 from ig2mj.learn.evaluate import wilson
 from ig2mj.learn.imitation import Imitation
-from ig2mj.learn.networks import AUGMENTATION, Actor, ConvEncoder, Convolutions, brightest, projected, shifted
+from ig2mj.learn.networks import AUGMENTATION, ActorNetwork, ConvEncoder, Convolutions, brightest, projected, shifted
 from ig2mj.learn.occlusion.glimpses import GLIMPSE, GlimpseEncoder, GlimpseFeatures, coarse, encoder_of, window
 from ig2mj.learn.occlusion.projection import FRAME, CameraProjection, ObjectTargets, with_object_targets
 from ig2mj.learn.perception import DEPTH_RANGE, Perception, Seen, shrunk
@@ -233,7 +233,7 @@ def test_rows_and_columns_of_objects_are_guessed_where_the_camera_is_known():
     # 4 m ahead, half a metre to the left, a quarter below: a quarter and an eighth of half the picture
     assert (column + 1) / 2 * 15 == pytest.approx(8 * (1 - 0.125) - 0.5)
     assert (row + 1) / 2 * 11 + 2 == pytest.approx(8 * (1 + 0.0625) - 0.5)
-    actor = Actor(2, (8,), GlimpseEncoder((12, 16, 4), hidden.pose_size, hidden.objects))
+    actor = ActorNetwork(2, (8,), GlimpseEncoder((12, 16, 4), hidden.pose_size, hidden.objects))
     seen = jnp.ones((2, 1)), jnp.ones((2, 768), jnp.uint8)
     shapes = jax.eval_shape(lambda key: actor.init_with_output(key, *seen)[0], jax.random.PRNGKey(0))
     assert shapes[2].shape == (2, 15)
@@ -264,7 +264,7 @@ def test_the_depth_at_the_brightest_point_is_seen():
     ("encoder", "moved"), [(GlimpseEncoder((12, 16, 4), 15, 2), False), (ConvEncoder((12, 16, 4), "points", 15), True)]
 )
 def test_whether_actions_train_the_encoder(encoder, moved):
-    actor = Actor(2, (8,), encoder)
+    actor = ActorNetwork(2, (8,), encoder)
     vector, picture = jnp.ones((4, 2)), jax.random.randint(jax.random.PRNGKey(0), (4, 768), 0, 256).astype(jnp.uint8)
 
     @jax.jit
@@ -287,7 +287,7 @@ def test_whether_actions_train_the_encoder(encoder, moved):
 
 @pytest.mark.slow
 def test_how_an_object_is_turned_is_learnt_from_its_own_glimpse_which_nothing_else_trains():
-    actor = Actor(2, (8,), GlimpseEncoder((12, 16, 4), 15, 2))
+    actor = ActorNetwork(2, (8,), GlimpseEncoder((12, 16, 4), 15, 2))
     vector, picture = jnp.ones((4, 2)), jax.random.randint(jax.random.PRNGKey(0), (4, 768), 0, 256).astype(jnp.uint8)
 
     @jax.jit
@@ -349,7 +349,7 @@ def test_glimpses_look_beside_their_points_while_they_learn():
 def test_policies_of_glimpses_are_small_enough_to_ship(vector, sizes, recalled):
     """Of the humanoid's and Fetch's SlicingFruit, without and with memory. A file has 1.85 bytes for each number."""
     actor, picture = (
-        Actor(6, (sizes, sizes), GlimpseEncoder((48, 128, 4), 47, 2), 21),
+        ActorNetwork(6, (sizes, sizes), GlimpseEncoder((48, 128, 4), 47, 2), 21),
         jnp.zeros((1, 48 * 128 * 4), jnp.uint8),
     )
     own, kept = jnp.zeros((1, vector)), jnp.zeros((1, recalled)) if recalled else None

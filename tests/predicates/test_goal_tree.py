@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import ig2mj
-from ig2mj.predicates.tree import Part, tree
+from ig2mj.predicates.tree import GoalPart, tree
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +13,7 @@ def world(tiny_home) -> ig2mj.Simulation:
     return ig2mj.Simulation(tiny_home)
 
 
-def parts(world, text: str) -> Part:
+def parts(world, text: str) -> GoalPart:
     return tree(world.compiled(text), world.states, world.view)
 
 

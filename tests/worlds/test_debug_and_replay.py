@@ -18,7 +18,7 @@ from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError, InputError
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
-from ig2mj.viewer.replay import Progress, Replay
+from ig2mj.viewer.replay import Replay, ReplayProgress
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.debug import DebugWorlds
 from ig2mj.worlds.recorder import Frames, load_dump, read_dump, save_dump
@@ -103,8 +103,8 @@ def test_a_replay_shows_each_step_as_it_was(dump, bare):
     for _ in range(9):
         replay.step()
     assert replay.at == 3 and replay.data.body("box").xpos[2] < -3.0
-    assert dict(Progress(replay).lines(replay.data))["step"] == "4 of 4"
-    assert "fell" in dict(Progress(replay).lines(replay.data))["dumped for"]
+    assert dict(ReplayProgress(replay).lines(replay.data))["step"] == "4 of 4"
+    assert "fell" in dict(ReplayProgress(replay).lines(replay.data))["dumped for"]
     replay.reset()
     assert replay.at == 0 and replay.data.time == pytest.approx(4 / 30, abs=1e-6)
 

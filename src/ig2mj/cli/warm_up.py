@@ -57,7 +57,7 @@ def run(
 
     if out is not None:
         keep_compiled_in(out)
-    batch = Batch(what, worlds, choose_robot(robot, own), grasping, observations, engine, object)
+    batch = WarmUpBatch(what, worlds, choose_robot(robot, own), grasping, observations, engine, object)
     seconds = _timed(batch) if arch is None else _ahead(batch, arch)
     seconds["all"] = time.perf_counter() - began
     folder = cache_folder()
@@ -75,7 +75,7 @@ def run(
 
 
 @dataclasses.dataclass(frozen=True)
-class Batch:
+class WarmUpBatch:
     """The worlds of a home, or an environment; see `run`."""
 
     what: str
@@ -110,7 +110,7 @@ MOST_WORLDS = 64
 """Worlds that are created to find kernels, which do not depend on the number."""
 
 
-def _ahead(batch: Batch, architecture: int) -> dict[str, float]:
+def _ahead(batch: WarmUpBatch, architecture: int) -> dict[str, float]:
     """Seconds of tracing and of compiling the kernels for a GPU architecture; needs no GPU."""
     import time
 
@@ -134,7 +134,7 @@ def _ahead(batch: Batch, architecture: int) -> dict[str, float]:
     return {"making": found - began, "kernels": time.perf_counter() - found}
 
 
-def _timed(batch: Batch) -> dict[str, float]:
+def _timed(batch: WarmUpBatch) -> dict[str, float]:
     """Seconds of creating the worlds, of the reset and of the first step."""
     import time
 

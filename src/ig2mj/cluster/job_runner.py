@@ -16,7 +16,7 @@ from typing import Protocol, runtime_checkable
 
 from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.cluster.jobs import Job, JobResult, JobSet
-from ig2mj.cluster.journal import Journal, Memory
+from ig2mj.cluster.journal import Journal, MemoryStore
 from ig2mj.errors import ClusterError, EngineError, Ig2mjError, StateError
 
 RETRIES = 2
@@ -67,9 +67,9 @@ class Workers(Protocol):
 def map_jobs(
     job_set: JobSet[Sequence[Job]],
     where: Where = Where(),
-    store: Journal | Memory | None = None,
+    store: Journal | MemoryStore | None = None,
     progress: ProgressCallback = no_progress,
-) -> tuple[Journal | Memory, dict[str, str]]:
+) -> tuple[Journal | MemoryStore, dict[str, str]]:
     """Runs all jobs that the store does not hold yet.
 
     Args:
@@ -81,7 +81,7 @@ def map_jobs(
     Raises:
       ClusterError: the cluster cannot be reached, or cannot run these jobs. An error that every job would raise.
     """
-    store = Memory() if store is None else store
+    store = MemoryStore() if store is None else store
     failed: dict[str, str] = {}
     with contextlib.closing(stream_jobs(job_set, where, store.names(), progress)) as results:
         for result in results:

@@ -33,7 +33,7 @@ Deliver = Callable[[str, bytes], None]
 """Writes the bytes of a finished job, by its name, to their destination."""
 
 
-class Memory:
+class MemoryStore:
     """Results in memory."""
 
     def __init__(self) -> None:

@@ -37,7 +37,7 @@ from ig2mj.envs.copies import StateCopies
 from ig2mj.envs.images import StateImages
 from ig2mj.envs.instructed import Instructed
 from ig2mj.envs.observations import Observer, Space
-from ig2mj.envs.state import EnvState, Seen, StepContext
+from ig2mj.envs.state import EnvState, SeenState, StepContext
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process import entry_point
@@ -321,7 +321,11 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
     ) -> EnvState:
         """After a reset of the masked worlds, to these rows of the pool; None: those that were sampled for them. The
         other worlds are as before."""
-        old = None if before is None else Seen(**{f.name: getattr(before, f.name) for f in dataclasses.fields(Seen)})
+        old = (
+            None
+            if before is None
+            else SeenState(**{f.name: getattr(before, f.name) for f in dataclasses.fields(SeenState)})
+        )
         if rows is None:
             rows = self._rows(batch.world.key)
         seen = self._evaluate_first(StepContext.of(batch), rows, mask, old)
@@ -329,7 +333,7 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         return self._state(batch, seen, count, before, mask)
 
     def _state(
-        self, batch: Batch, seen: Seen, bad: Int[Array, "W"], before: EnvState | None, begun: Array | None = None
+        self, batch: Batch, seen: SeenState, bad: Int[Array, "W"], before: EnvState | None, begun: Array | None = None
     ) -> EnvState:
         """A state with its images. `begun`: worlds that were reset since `before`; the others keep its images."""
         last = None if before is None else (before.obs, before.memory)
@@ -355,7 +359,9 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
     def _rows_fn(self, key: UInt[Array, "W 2"]) -> Int[Array, "W"]:
         return pick_rows(key, self.core.starts.pool.size)
 
-    def _evaluate_fn(self, context: StepContext, status: GoalStatus, before: Measures, bad: Int[Array, "W"]) -> Seen:
+    def _evaluate_fn(
+        self, context: StepContext, status: GoalStatus, before: Measures, bad: Int[Array, "W"]
+    ) -> SeenState:
         """What follows from a step: reward, ends of episodes, observations that need no images.
 
         Args:
@@ -376,8 +382,8 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         return self._seen(context, status, now, terms, terminated, truncated, info)
 
     def _evaluate_first_fn(
-        self, context: StepContext, rows: Int[Array, "W"], mask: Bool[Array, "W"], before: Seen | None
-    ) -> Seen:
+        self, context: StepContext, rows: Int[Array, "W"], mask: Bool[Array, "W"], before: SeenState | None
+    ) -> SeenState:
         """The same at the start of episodes in the masked worlds; the others keep `before`.
 
         Args:
@@ -404,7 +410,7 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         terminated: Bool[Array, "W"],
         truncated: Bool[Array, "W"],
         info: Mapping[str, Array],
-    ) -> Seen:
+    ) -> SeenState:
         """Observations and `info`. `terms`: of the reward. `info`: "success", "steps", "bad_actions", "flags"."""
         info = {
             "success": info["success"],
@@ -415,7 +421,7 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         time_left = 1.0 - info["steps"].astype(jnp.float32) / self.task.horizon
         obs = self._observer.vectors(context, measures, status, time_left)
         total = jnp.stack([terms[name] for name in self.objective.terms]).sum(0)
-        return Seen(obs, total, terminated, truncated, info, measures, status)
+        return SeenState(obs, total, terminated, truncated, info, measures, status)
 
     def metrics(self, state: EnvState) -> dict[str, int]:
         """Episodes begun, worlds flagged by `guards.Flag`, and numbers of actions that were not finite. On the host."""

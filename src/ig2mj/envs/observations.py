@@ -27,7 +27,7 @@ from ig2mj.envs.state import StepContext
 from ig2mj.errors import PluginError, UnknownNameError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.scene import Scene
-from ig2mj.sensors.base import Memory, SensorOptions, Space
+from ig2mj.sensors.base import SensorMemory, SensorOptions, Space
 from ig2mj.sensors.cameras import check_cameras, split_name
 from ig2mj.sensors.noise import noisy
 from ig2mj.sensors.registry import OWN, SENSORS
@@ -126,10 +126,10 @@ class Observer:
         self,
         world: WorldState,
         controller_state: Any,
-        last: tuple[Mapping[str, Array], Memory | None] | None,
+        last: tuple[Mapping[str, Array], SensorMemory | None] | None,
         begun: Bool[Array, "W"] | None = None,
         draw: Draw | None = None,
-    ) -> tuple[dict[str, Array], Memory | None]:
+    ) -> tuple[dict[str, Array], SensorMemory | None]:
         """Readings of cameras and lasers, and what those of the next step need to know (`SensorSuite.look_fn`).
 
         Args:

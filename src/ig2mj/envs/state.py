@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.engine.view import Array, PhysicsView, length
 from ig2mj.predicates.compile import GoalStatus
-from ig2mj.sensors.base import Memory
+from ig2mj.sensors.base import SensorMemory
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.objective import Measures
 from ig2mj.worlds.batch import Batch
@@ -51,7 +51,7 @@ class EnvState:
     measures: Measures
     status: GoalStatus
     bad_actions: Int[Array, "W"]
-    memory: Memory | None = None
+    memory: SensorMemory | None = None
 
     @property
     def done(self) -> Bool[Array, "W"]:
@@ -106,7 +106,7 @@ class StepContext:
 
 
 @struct.dataclass
-class Seen:
+class SeenState:
     """Results of a step that are computed after physics, in one program."""
 
     obs: dict[str, Array]

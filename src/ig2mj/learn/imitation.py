@@ -17,7 +17,7 @@ from ig2mj.engine.view import Array
 from ig2mj.learn.action_distributions import label_loss, mode
 from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.imitation_buffer import ImagelessBatch
-from ig2mj.learn.networks import AUGMENTATION, Actor, apply_with_memory, conv_encoder, shifted
+from ig2mj.learn.networks import AUGMENTATION, ActorNetwork, apply_with_memory, conv_encoder, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.protocols import Encoder, Memory
 from ig2mj.learn.running_stats import RunningStats
@@ -47,7 +47,7 @@ class Imitation:
         self.memory, targets = memory, perception.targets
         predictions = targets.size if targets and config.aux_coef else 0
         encoder = encoder or conv_encoder(perception.image_shape, config.encoder, predictions)
-        self.actor = Actor(action_size, tuple(config.actor_layers), encoder, config.action_bins)
+        self.actor = ActorNetwork(action_size, tuple(config.actor_layers), encoder, config.action_bins)
         self._perception, self._axis = perception, axis
         self._aux_coef, self._shift = config.aux_coef, config.image_shift
         self._adam = averaged_adam(10.0, axis)

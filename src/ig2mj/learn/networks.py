@@ -143,7 +143,7 @@ def brightest(maps: Float[Array, "B h w c"], depth: Float[Array, "B h w"] | None
     return jnp.concatenate([row, column, there, there * row, there * column], axis=-1)
 
 
-class Actor(nn.Module):
+class ActorNetwork(nn.Module):
     """Mean and logarithm of the standard deviation of a Gaussian, whose tanh is the action; with `bins` instead the
     logits of so many values for each number of the action (`ig2mj.learn.action_distributions` samples from either).
 
@@ -216,9 +216,9 @@ def apply_with_memory(
     """What an actor gives that may have a memory, and what it remembers from then on.
 
     Args:
-      apply: an `Actor` with its weights. scales: mean and deviation of the vector, and of the privileged numbers after
-        it where the memory needs those. vector: as it was observed. kept, begins: see `Memory.after`; without a memory
-        `kept` is returned as it is.
+      apply: an `ActorNetwork` with its weights. vector: as it was observed.
+      scales: mean and deviation of the vector, and of the privileged numbers after it where the memory needs those.
+      kept, begins: see `Memory.after`; without a memory `kept` is returned as it is.
     """
     size = vector.shape[-1]
     own = normal(vector, scales[0][:size], scales[1][:size])

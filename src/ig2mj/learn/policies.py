@@ -31,7 +31,7 @@ from ig2mj.files.npz import read_npz
 from ig2mj.files.unfinished import unfinished
 from ig2mj.learn.action_distributions import mode, sample
 from ig2mj.learn.checkpoints import refuse_difference
-from ig2mj.learn.networks import Actor, apply_with_memory, conv_encoder
+from ig2mj.learn.networks import ActorNetwork, apply_with_memory, conv_encoder
 from ig2mj.learn.occlusion import glimpses
 from ig2mj.learn.occlusion.object_memory import ObjectMemory
 from ig2mj.learn.perception import DEPTH_RANGE, SIZE, Perception
@@ -303,7 +303,7 @@ class Policy:
         shape = depends["picture"] and tuple(depends["picture"])
         glimpsing = shape and net["net"] == glimpses.NAME
         encoder = glimpses.encoder_from_card(net, shape) if glimpsing else conv_encoder(shape, net["net"])
-        network = Actor(len(depends["actions"]), tuple(net["sizes"]), encoder, net.get("choices", 0))
+        network = ActorNetwork(len(depends["actions"]), tuple(net["sizes"]), encoder, net.get("choices", 0))
         size, mine = perception.actor_size, self.parameters()
 
         def heads(vector: Array, image: Array, kept: Array, begins: Array, parameters: Any) -> Any:

@@ -23,7 +23,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array
 from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.collect import Advice, Transition, if_ready
-from ig2mj.learn.networks import Actor, Value, conv_encoder, shifted
+from ig2mj.learn.networks import ActorNetwork, Value, conv_encoder, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.running_stats import RewardScale, RunningStats, average
 from ig2mj.learn.settings import old_names_work
@@ -102,7 +102,9 @@ class PPO:
         self.perception, self.action_size, self.axis = perception, action_size, axis
         self.config = c = config or PPOConfig()
         predictions = perception.targets.size if perception.targets and c.aux_coef else 0
-        self.actor = Actor(action_size, c.actor_layers, conv_encoder(perception.image_shape, c.encoder, predictions))
+        self.actor = ActorNetwork(
+            action_size, c.actor_layers, conv_encoder(perception.image_shape, c.encoder, predictions)
+        )
         self.value = Value(c.critic_layers)
         self._adam = averaged_adam(1.0, axis, eps=1e-5)
 

@@ -26,8 +26,8 @@ Scales = tuple[Float[Array, "v"], Float[Array, "v"]]
 class Encoder(Protocol):
     """Turns images into features for an actor, and predicts privileged numbers from them.
 
-    A constant that can be hashed. Its methods are called inside `networks.Actor`: the layers that they make are that
-    module's.
+    A constant that can be hashed. Its methods are called inside `networks.ActorNetwork`: the layers that they make
+    are that module's.
 
     Attributes:
       shape: height, width and channels of an image. predictions: g; 0 where nothing is predicted.

@@ -33,7 +33,7 @@ from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.collect import GUIDED, Advice, Transition, if_ready
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.guidance import guided, remaining, uncounted
-from ig2mj.learn.networks import AUGMENTATION, Actor, conv_encoder, projected, shifted, twins
+from ig2mj.learn.networks import AUGMENTATION, ActorNetwork, conv_encoder, projected, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.protocols import Adviser, Encoder, Expert, as_adviser
 from ig2mj.learn.replay import Replay, Sample
@@ -169,7 +169,7 @@ class SAC:
         self.config = c = config or SACConfig()
         predictions = perception.targets.size if perception.targets and c.aux_coef else 0
         encoder = encoder or conv_encoder(perception.image_shape, c.encoder, predictions)
-        self.actor = Actor(action_size, c.actor_layers, encoder)
+        self.actor = ActorNetwork(action_size, c.actor_layers, encoder)
         self.critic = twins(c.num_atoms, c.critic_layers)
         self._support = jnp.linspace(-c.v_max, c.v_max, c.num_atoms)
         self._entropy = 0.5 * action_size * math.log(2 * math.pi * math.e * c.target_std**2)

@@ -17,7 +17,7 @@ from ig2mj.looks.home_plan import Face, HomePlan, Room, Solid, seed_of, spans
 from ig2mj.looks.light import Light
 from ig2mj.looks.materials import Material
 from ig2mj.looks.mesh import Builder
-from ig2mj.looks.ornaments import Place, Stock, pick
+from ig2mj.looks.ornaments import OrnamentPlace, Stock, pick
 
 CURTAINS = {
     "living_room": (0.88, 0.84, 0.76), "bedroom": (0.62, 0.70, 0.78), "dining_room": (0.76, 0.52, 0.42),
@@ -184,7 +184,7 @@ class _Furnisher:
             face = max(free, key=lambda f: (round(f.high - f.low, 2), f.axis, f.at))
             length = face.high - face.low
             along = (face.low + face.high) / 2
-            make(Place(face.point(along, 0.004, (bottom + top) / 2), face.turn), length)
+            make(OrnamentPlace(face.point(along, 0.004, (bottom + top) / 2), face.turn), length)
             self._take(face, along, max(width, min(length, 1.5)), depth)
             made += 1
         return made
@@ -200,7 +200,7 @@ class _Furnisher:
         for window in (w for w in self.plan.windows if w.face.room == self.room.name and w.outside):
             low, high = window.along
             face = window.face
-            place = Place(face.point((low + high) / 2, 0.004, 0.0), face.turn)
+            place = OrnamentPlace(face.point((low + high) / 2, 0.004, 0.0), face.turn)
             if cloth is not None:
                 clear = not any(
                     s.category not in ("window", "carpet") and s.low[2] < face.bottom and s.high[2] > 0.12
@@ -240,12 +240,14 @@ class _Furnisher:
         drop = {"dining_room": 0.75, "kitchen": 0.45}.get(self.room.kind, 0.3)
         for spot in spots:
             turn = 0.0 if self.room.size[0] >= self.room.size[1] else math.pi / 2
-            ornaments.pendant(self.build, Place(np.array([*spot, self.plan.height]), turn), drop, kind, self.stock)
+            ornaments.pendant(
+                self.build, OrnamentPlace(np.array([*spot, self.plan.height]), turn), drop, kind, self.stock
+            )
 
     def _entrance(self) -> None:
         """Coats on hooks and shoes below them."""
 
-        def make(place: Place, length: float | int) -> None:
+        def make(place: OrnamentPlace, length: float | int) -> None:
             width = min(1.1, length - 0.1)
             ornaments.coat_hooks(self.build, place.at(0, 0, 0.78), width, self.stock)
             self.build.paint((0.42, 0.36, 0.30), *place.put(mesh.box((0, 0.19, -0.935), (width, 0.34, 0.012))))
@@ -258,7 +260,7 @@ class _Furnisher:
         """Rails with coats, or with shirts above what stands at the wall."""
         for bottom, shortest, longest in ((0.6, 0.55, 0.9), (1.15, 0.4, 0.5)):
 
-            def make(place: Place, length: float | int, bottom=bottom, sizes=(shortest, longest)) -> None:
+            def make(place: OrnamentPlace, length: float | int, bottom=bottom, sizes=(shortest, longest)) -> None:
                 rail = place.at(0, 0, (1.75 - bottom) / 2 - 0.05)
                 ornaments.clothes_rail(self.build, rail, min(1.4, length), self.stock, sizes)
 
@@ -269,7 +271,7 @@ class _Furnisher:
         rows = {"library": 4, "pantry_room": 3, "storage_room": 2, "home_office": 2}.get(kind, 1)
         bottom = {3: 1.02, 4: 0.72}.get(rows, 1.38)
 
-        def make(place: Place, length: float | int) -> None:
+        def make(place: OrnamentPlace, length: float | int) -> None:
             for row in range(rows):
                 shelves.wall_shelf(
                     self.build,
@@ -288,7 +290,7 @@ class _Furnisher:
         rng, stock = self.stock.rng, self.stock
         sizes = ((0.62, 0.45), (0.45, 0.6), (0.9, 0.6), (0.36, 0.36))
 
-        def make(place: Place, length: float | int) -> None:
+        def make(place: OrnamentPlace, length: float | int) -> None:
             width, height = pick(rng, [s for s in sizes if s[0] < length - 0.1])
             if length > 1.9 and rng.integers(2):
                 for x in (-0.5, 0.0, 0.5):
@@ -341,12 +343,12 @@ class _Furnisher:
                 spot = spots.pop() if spots else pick(rng, at_wall)
                 away = middle - spot
                 turn = math.atan2(-away[0], away[1])  # its front (y) looks into the room
-                thing(self.build, Place(np.array([*spot, 0.0]), turn), self.stock)
+                thing(self.build, OrnamentPlace(np.array([*spot, 0.0]), turn), self.stock)
                 low, high = spot - BESIDE_WALL, spot + BESIDE_WALL
                 self.taken.append(Solid(np.array([*low, 0.0]), np.array([*high, PLANT_HEIGHT]), "decoration"))
         for spot in spots[: PLANTS.get(kind, 0)]:
             height = float(rng.uniform(0.8, 1.0)) * PLANT_HEIGHT
-            ornaments.plant(self.build, Place(np.array([*spot, 0.0])), height, self.stock)
+            ornaments.plant(self.build, OrnamentPlace(np.array([*spot, 0.0])), height, self.stock)
 
     def _ends_of_walls(self) -> list[np.ndarray]:
         """Where something may stand next to a wall: at the ends of free stretches, away from doors."""
@@ -393,7 +395,7 @@ class _Furnisher:
             if 0.7 < face.top < 1.3 and face.high - face.low > 0.8:
                 along = face.low + 0.5
                 while along < face.high - 0.3:
-                    place = Place(face.point(along, -0.05, face.top), face.turn)
+                    place = OrnamentPlace(face.point(along, -0.05, face.top), face.turn)
                     self.build.paint((0.70, 0.42, 0.30), *place.put(mesh.box((0, 0, 0.08), (0.6, 0.16, 0.16))))
                     for k in range(12):
                         x = -0.26 + 0.047 * k

@@ -25,7 +25,7 @@ STEEL, BLACK, LINEN = (0.74, 0.75, 0.76), (0.16, 0.16, 0.17), (0.93, 0.89, 0.80)
 
 
 @dataclasses.dataclass(frozen=True)
-class Place:
+class OrnamentPlace:
     """Where, and how turned about the vertical (rad)."""
 
     pos: np.ndarray
@@ -34,10 +34,10 @@ class Place:
     def put(self, *parts: Triangles) -> list[Triangles]:
         return [p.moved(self.pos, self.turn) for p in parts]
 
-    def at(self, x: float | int, y: float | int, z: float | int) -> Place:
+    def at(self, x: float | int, y: float | int, z: float | int) -> OrnamentPlace:
         """A place in the frame of this one."""
         c, s = math.cos(self.turn), math.sin(self.turn)
-        return Place(self.pos + np.array([c * x - s * y, s * x + c * y, z]), self.turn)
+        return OrnamentPlace(self.pos + np.array([c * x - s * y, s * x + c * y, z]), self.turn)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +57,7 @@ def pick(rng: np.random.Generator, choices):
 # ------------------------------------------------------------------------------------------------ on walls
 
 
-def picture(build: Builder, place: Place, width: float | int, height: float | int, stock: Stock) -> None:
+def picture(build: Builder, place: OrnamentPlace, width: float | int, height: float | int, stock: Stock) -> None:
     """A framed picture, its middle at the place."""
     rng, frame = stock.rng, 0.025
     mount = 0.045 if min(width, height) > 0.3 else 0.02
@@ -87,7 +87,7 @@ def _facing(width: float | int, height: float | int, out: float | int, uv=None) 
     return mesh.quad([(w, out, -h), (-w, out, -h), (-w, out, h), (w, out, h)], uv)
 
 
-def coat_hooks(build: Builder, place: Place, width: float | int, stock: Stock) -> None:
+def coat_hooks(build: Builder, place: OrnamentPlace, width: float | int, stock: Stock) -> None:
     """A board with hooks, coats and a bag, its middle at the place."""
     build.paint(pick(stock.rng, WOODS), *place.put(mesh.box((0, 0.012, 0), (width, 0.024, 0.09), "-y")))
     count = max(2, int(width / 0.2))
@@ -112,7 +112,7 @@ def coat_hooks(build: Builder, place: Place, width: float | int, stock: Stock) -
             )
 
 
-def coat(build: Builder, place: Place, stock: Stock, length: float | None = None) -> None:
+def coat(build: Builder, place: OrnamentPlace, stock: Stock, length: float | None = None) -> None:
     """Hangs down from the place."""
     colour = pick(stock.rng, CLOTHES)
     h = length or float(stock.rng.uniform(0.62, 0.85))
@@ -126,7 +126,7 @@ def coat(build: Builder, place: Place, stock: Stock, length: float | None = None
     build.paint(dark, *place.put(mesh.box((0, 0.061, -h * 0.5), (0.006, 0.004, h * 0.8))))
 
 
-def shoes(build: Builder, place: Place, stock: Stock) -> None:
+def shoes(build: Builder, place: OrnamentPlace, stock: Stock) -> None:
     """A pair, toes away from the wall."""
     colour = pick(stock.rng, ((0.30, 0.22, 0.16), (0.85, 0.84, 0.82), (0.20, 0.28, 0.42), (0.62, 0.22, 0.22), BLACK))
     for x in (-0.055, 0.055):
@@ -140,7 +140,7 @@ def shoes(build: Builder, place: Place, stock: Stock) -> None:
         build.paint((0.08, 0.08, 0.08), *place.put(mesh.ball((0.026, 0.035, 0.006), (x, 0.055, 0.1))))
 
 
-def towel_rail(build: Builder, place: Place, stock: Stock) -> None:
+def towel_rail(build: Builder, place: OrnamentPlace, stock: Stock) -> None:
     """Its rail at the place, with a towel."""
     build.paint(STEEL, *place.put(mesh.rod((-0.3, 0.06, 0), (0.3, 0.06, 0), 0.009)))
     for x in (-0.3, 0.3):
@@ -159,7 +159,7 @@ def towel_rail(build: Builder, place: Place, stock: Stock) -> None:
         build.paint(dark, *place.put(mesh.box((x, 0.0755, -0.38), (w, 0.015, 0.03))))
 
 
-def utensil_rail(build: Builder, place: Place, width: float | int, stock: Stock) -> None:
+def utensil_rail(build: Builder, place: OrnamentPlace, width: float | int, stock: Stock) -> None:
     """A rail with ladles and pans."""
     build.paint(STEEL, *place.put(mesh.rod((-width / 2, 0.035, 0), (width / 2, 0.035, 0), 0.007)))
     x, k = -width / 2 + 0.06, 0
@@ -184,7 +184,7 @@ def utensil_rail(build: Builder, place: Place, width: float | int, stock: Stock)
 
 
 def clothes_rail(
-    build: Builder, place: Place, width: float | int, stock: Stock, lengths: tuple[float, float] = (0.55, 0.9)
+    build: Builder, place: OrnamentPlace, width: float | int, stock: Stock, lengths: tuple[float, float] = (0.55, 0.9)
 ) -> None:
     """A rail on the wall with clothes on it, which hang down by `lengths` m, from and to."""
     build.paint(STEEL, *place.put(mesh.rod((-width / 2, 0.16, 0), (width / 2, 0.16, 0), 0.012)))
@@ -192,12 +192,12 @@ def clothes_rail(
         build.paint(STEEL, *place.put(mesh.rod((x, 0, 0), (x, 0.16, 0), 0.01)))
     x = -width / 2 + 0.12
     while x < width / 2 - 0.1:
-        spot = Place(place.at(x, 0.16, -0.02).pos, place.turn + math.pi / 2)
+        spot = OrnamentPlace(place.at(x, 0.16, -0.02).pos, place.turn + math.pi / 2)
         coat(build, spot, stock, float(stock.rng.uniform(*lengths)))
         x += float(stock.rng.uniform(0.1, 0.16))
 
 
-def bunting(build: Builder, place: Place, width: float | int, stock: Stock) -> None:
+def bunting(build: Builder, place: OrnamentPlace, width: float | int, stock: Stock) -> None:
     """Flags on a string along the wall, hanging from both ends of `width`."""
     count = max(4, int(width / 0.16))
     for k in range(count):
@@ -216,7 +216,7 @@ def bunting(build: Builder, place: Place, width: float | int, stock: Stock) -> N
         )
 
 
-def wall_bars(build: Builder, place: Place, stock: Stock) -> None:
+def wall_bars(build: Builder, place: OrnamentPlace, stock: Stock) -> None:
     """A ladder along the wall for gymnastics, its foot at the place."""
     for x in (-0.42, 0.42):
         build.paint(WOODS[2], *place.put(mesh.box((x, 0.05, 1.05), (0.04, 0.1, 2.1), "-y")))
@@ -224,7 +224,7 @@ def wall_bars(build: Builder, place: Place, stock: Stock) -> None:
         build.paint(WOODS[0], *place.put(mesh.rod((-0.42, 0.08, 0.2 + 0.18 * k), (0.42, 0.08, 0.2 + 0.18 * k), 0.016)))
 
 
-def garden_tools(build: Builder, place: Place, stock: Stock) -> None:
+def garden_tools(build: Builder, place: OrnamentPlace, stock: Stock) -> None:
     """A rake, a shovel and a broom on hooks."""
     build.paint(WOODS[1], *place.put(mesh.box((0, 0.012, 0.1), (0.9, 0.024, 0.07), "-y")))
     for k, x in enumerate((-0.3, 0.0, 0.3)):
@@ -234,7 +234,7 @@ def garden_tools(build: Builder, place: Place, stock: Stock) -> None:
         build.paint(colour, *place.put(mesh.box((x, 0.05, -1.05), head)))
 
 
-def sconce(build: Builder, place: Place, stock: Stock) -> None:
+def sconce(build: Builder, place: OrnamentPlace, stock: Stock) -> None:
     """A lamp on the wall."""
     build.paint(
         (0.72, 0.60, 0.38),
@@ -248,7 +248,7 @@ def sconce(build: Builder, place: Place, stock: Stock) -> None:
     )
 
 
-def pinned_papers(build: Builder, place: Place, stock: Stock) -> None:
+def pinned_papers(build: Builder, place: OrnamentPlace, stock: Stock) -> None:
     """A cork board with notes."""
     build.paint((0.76, 0.58, 0.38), *place.put(mesh.box((0, 0.01, 0), (0.8, 0.02, 0.52), "-y")))
     for k in range(6):
@@ -266,7 +266,7 @@ def pinned_papers(build: Builder, place: Place, stock: Stock) -> None:
 # ---------------------------------------------------------------------------------------------- on the floor
 
 
-def plant(build: Builder, place: Place, height: float | int, stock: Stock, trailing: bool = False) -> None:
+def plant(build: Builder, place: OrnamentPlace, height: float | int, stock: Stock, trailing: bool = False) -> None:
     """A plant in a pot that stands at the place, `height` m high with its leaves."""
     rng = stock.rng
     pot = 0.30 * height if height > 0.5 else 0.42 * height
@@ -292,7 +292,7 @@ def plant(build: Builder, place: Place, height: float | int, stock: Stock, trail
         green = pick(rng, LEAVES)
         build.paint(
             green,
-            *Place(part.pos, part.turn + turn).put(
+            *OrnamentPlace(part.pos, part.turn + turn).put(
                 leaf(length, 0.16 * length + 0.012, steep, 1.3 if not trailing else 1.9)
             ),
         )
@@ -318,7 +318,7 @@ def leaf(length: float | int, width: float | int, steep: float | int, bend: floa
 # ---------------------------------------------------------------------------------------- at the ceiling, at windows
 
 
-def pendant(build: Builder, place: Place, drop: float | int, kind: str, stock: Stock) -> None:
+def pendant(build: Builder, place: OrnamentPlace, drop: float | int, kind: str, stock: Stock) -> None:
     """A lamp that hangs `drop` m below the ceiling at the place."""
     rng = stock.rng
     if kind == "globe":
@@ -360,7 +360,7 @@ def pendant(build: Builder, place: Place, drop: float | int, kind: str, stock: S
 
 
 def curtains(
-    build: Builder, place: Place, width: float | int, top: float | int, bottom: float | int, cloth: Material
+    build: Builder, place: OrnamentPlace, width: float | int, top: float | int, bottom: float | int, cloth: Material
 ) -> None:
     """Two curtains on a rod, to both sides of `width` m; `top` and `bottom` are heights above the place."""
     reach = width / 2 + 0.22
@@ -388,7 +388,7 @@ def curtains(
 
 
 def blind(
-    build: Builder, place: Place, width: float | int, top: float | int, drop: float | int, colour: Colour
+    build: Builder, place: OrnamentPlace, width: float | int, top: float | int, drop: float | int, colour: Colour
 ) -> None:
     """A roller blind, a part of its way down."""
     build.paint(

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from ig2mj.looks import mesh
 from ig2mj.looks.mesh import Builder, Colour
-from ig2mj.looks.ornaments import BLACK, POTS, STEEL, WOODS, Place, Stock, pick, picture, plant
+from ig2mj.looks.ornaments import BLACK, POTS, STEEL, WOODS, OrnamentPlace, Stock, pick, picture, plant
 
 BOOKS: tuple[Colour, ...] = (
     (0.70, 0.22, 0.20), (0.20, 0.36, 0.55), (0.88, 0.72, 0.35), (0.25, 0.45, 0.35), (0.85, 0.82, 0.74),
@@ -18,7 +18,7 @@ BOOKS: tuple[Colour, ...] = (
 
 
 def wall_shelf(
-    build: Builder, place: Place, width: float | int, kind: str, stock: Stock, depth: float | int = 0.19
+    build: Builder, place: OrnamentPlace, width: float | int, kind: str, stock: Stock, depth: float | int = 0.19
 ) -> None:
     """A board on the wall at the place, with what a room of that kind has on it."""
     rng = stock.rng
@@ -36,7 +36,7 @@ def wall_shelf(
         x += used + float(rng.uniform(0.015, 0.05))
 
 
-def books(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def books(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     """A row of books; returns the width that it takes."""
     rng, x = stock.rng, 0.0
     for _ in range(int(rng.integers(4, 10))):
@@ -57,14 +57,14 @@ def books(build: Builder, place: Place, room: float | int, stock: Stock) -> floa
     return x
 
 
-def small_plant(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def small_plant(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     if room < 0.16:
         return 0.0
     plant(build, place.at(0.08, 0.06, 0.0), 0.24, stock, trailing=bool(stock.rng.integers(2)))
     return 0.16
 
 
-def vase(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def vase(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     if room < 0.12:
         return 0.0
     h = float(stock.rng.uniform(0.14, 0.22))
@@ -73,14 +73,14 @@ def vase(build: Builder, place: Place, room: float | int, stock: Stock) -> float
     return 0.12
 
 
-def standing_frame(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def standing_frame(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     if room < 0.2:
         return 0.0
     picture(build, place.at(0.09, 0.01, 0.105), 0.15, 0.19, stock)
     return 0.19
 
 
-def jar(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def jar(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     if room < 0.11:
         return 0.0
     h = float(stock.rng.uniform(0.10, 0.17))
@@ -96,7 +96,7 @@ def jar(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     return 0.11
 
 
-def bottle(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def bottle(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     if room < 0.08:
         return 0.0
     h = float(stock.rng.uniform(0.15, 0.21))
@@ -114,7 +114,7 @@ def bottle(build: Builder, place: Place, room: float | int, stock: Stock) -> flo
     return 0.08
 
 
-def folded_towels(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def folded_towels(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     if room < 0.3:
         return 0.0
     for k in range(3):
@@ -123,7 +123,7 @@ def folded_towels(build: Builder, place: Place, room: float | int, stock: Stock)
     return 0.28
 
 
-def toy(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def toy(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     """A teddy bear, or blocks."""
     rng = stock.rng
     if room < 0.18:
@@ -151,7 +151,7 @@ def toy(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
     return 0.14
 
 
-def box_file(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def box_file(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     if room < 0.1:
         return 0.0
     colour = pick(stock.rng, ((0.30, 0.42, 0.55), (0.85, 0.82, 0.76), (0.72, 0.35, 0.30), (0.35, 0.36, 0.38)))
@@ -160,7 +160,7 @@ def box_file(build: Builder, place: Place, room: float | int, stock: Stock) -> f
     return 0.085
 
 
-def carton(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def carton(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     if room < 0.27:
         return 0.0
     h = float(stock.rng.uniform(0.14, 0.22))
@@ -169,7 +169,7 @@ def carton(build: Builder, place: Place, room: float | int, stock: Stock) -> flo
     return 0.26
 
 
-def paint_can(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def paint_can(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     if room < 0.17:
         return 0.0
     at, colour = place.at(0.08, 0.08, 0), pick(stock.rng, ((0.30, 0.50, 0.62), (0.80, 0.45, 0.25), (0.88, 0.80, 0.52)))
@@ -184,7 +184,7 @@ def paint_can(build: Builder, place: Place, room: float | int, stock: Stock) -> 
     return 0.17
 
 
-def basket(build: Builder, place: Place, room: float | int, stock: Stock) -> float:
+def basket(build: Builder, place: OrnamentPlace, room: float | int, stock: Stock) -> float:
     if room < 0.27:
         return 0.0
     build.paint((0.72, 0.58, 0.40), *place.put(mesh.box((0.13, 0.08, 0.07), (0.25, 0.15, 0.14), "+z")))
@@ -192,7 +192,7 @@ def basket(build: Builder, place: Place, room: float | int, stock: Stock) -> flo
     return 0.27
 
 
-Item = Callable[[Builder, Place, float | int, Stock], float | int]
+Item = Callable[[Builder, OrnamentPlace, float | int, Stock], float | int]
 ON_SHELVES: dict[str, tuple[Item, ...]] = {
     "living_room": (books, books, small_plant, vase, standing_frame),
     "television_room": (books, vase, standing_frame),

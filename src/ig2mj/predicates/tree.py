@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True)
-class Part:
+class GoalPart:
     """A part of an expression in one world.
 
     Attributes:
@@ -30,7 +30,7 @@ class Part:
     expected: bool
     literal: bool = False
     why: str = ""
-    parts: tuple[Part, ...] = ()
+    parts: tuple[GoalPart, ...] = ()
 
     @property
     def fine(self) -> bool:
@@ -38,32 +38,32 @@ class Part:
         return self.holds == self.expected
 
 
-def tree(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int = 0) -> Part:
+def tree(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int = 0) -> GoalPart:
     """The expression in one world, without quantifiers: they are written out for the scene's objects."""
     context, table = truth_in(compiled, states, view, world)
     reason = reason_of(compiled, context)
 
-    def part(e: Expression, expected: bool) -> Part:
+    def part(e: Expression, expected: bool) -> GoalPart:
         holds = value_of(e, table)
         match e:
             case Atom():
                 why = reason(e) if holds != expected else ""
-                return Part(logic.text(e), holds, expected, True, why)
+                return GoalPart(logic.text(e), holds, expected, True, why)
             case Not(Atom() as inner):
                 inside = part(inner, not expected)
-                return Part(f"not {inside.text}", holds, expected, True, inside.why)
+                return GoalPart(f"not {inside.text}", holds, expected, True, inside.why)
             case Not(inner):
-                return Part("not", holds, expected, parts=(part(inner, not expected),))
+                return GoalPart("not", holds, expected, parts=(part(inner, not expected),))
             case And(parts) | Or(parts):
                 name = "all of" if isinstance(e, And) else "one of"
-                return Part(name, holds, expected, parts=tuple(part(p, expected) for p in parts))
+                return GoalPart(name, holds, expected, parts=tuple(part(p, expected) for p in parts))
             case Exactly(count, parts):
                 found = sum(value_of(p, table) for p in parts)
                 name = f"exactly {count} of {len(parts)}, now {found}"
-                return Part(name, holds, expected, parts=tuple(part(p, found <= count) for p in parts))
+                return GoalPart(name, holds, expected, parts=tuple(part(p, found <= count) for p in parts))
             case Pairing(count, rows):
                 inner = tuple(part(p, expected) for row in rows for p in row if p is not None)
-                return Part(f"{count} pairs, now {min(pairs_found(rows, table))}", holds, expected, parts=inner)
+                return GoalPart(f"{count} pairs, now {min(pairs_found(rows, table))}", holds, expected, parts=inner)
         raise TypeError(f"{e!r} is not a ground expression")
 
     return part(compiled.ground, True)

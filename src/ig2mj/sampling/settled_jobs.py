@@ -15,7 +15,7 @@ import jax
 from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.cluster.job_runner import Where, map_jobs
 from ig2mj.cluster.jobs import Job, JobSet, WholeRunError
-from ig2mj.cluster.journal import Journal, Memory
+from ig2mj.cluster.journal import Journal, MemoryStore
 from ig2mj.errors import EngineError
 from ig2mj.sampling.scene_refs import check_of, lent, named, scene_named
 from ig2mj.sampling.settled import Disturber, most_turns, too_few, width_of
@@ -48,7 +48,7 @@ def sample_settled(
     Raises:
       EngineError: too few rows come to rest. ClusterError: see `ig2mj.cluster.job_runner.map_jobs`.
     """
-    width, store = width_of(count), Memory() if journal is None else journal
+    width, store = width_of(count), MemoryStore() if journal is None else journal
     common = {**named(scene), "seed": seed, "share": share, "width": width}
     jobs: list[Job] = []
     pools: list[Pool] = []

@@ -179,7 +179,7 @@ class Setup:
 
 
 @struct.dataclass
-class Memory:
+class SensorMemory:
     """What was where at the last reading: from which flow is computed. World frame.
 
     Attributes:
@@ -209,7 +209,7 @@ class Percept:
     controller: Any
     eye: Pose | None = None
     images: Images | None = None
-    before: Memory | None = None
+    before: SensorMemory | None = None
     keys: UInt32[Array, "W 2"] | None = None
 
 

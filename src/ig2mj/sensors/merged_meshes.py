@@ -32,7 +32,7 @@ def mergeable(host: mujoco.MjModel) -> bool:
 
 
 @dataclasses.dataclass(frozen=True)
-class Part:
+class RigidPart:
     """Meshes that move as one.
 
     Attributes:
@@ -53,7 +53,7 @@ def rigid_parts(
     scene: mujoco.MjModel,
     groups: Sequence[int],
     covered: Mapping[int, Bool[np.ndarray, "F"]] = MappingProxyType({}),
-) -> list[Part]:
+) -> list[RigidPart]:
     """The parts of a render model, those that never move first; the garden is one of the others.
 
     Meshes that are invisible (alpha 0) in the compiled scene are in no part.
@@ -93,7 +93,7 @@ def _part(
     geoms: list[int],
     covered: Mapping[int, Bool[np.ndarray, "F"]],
     moves: bool,
-) -> Part:
+) -> RigidPart:
     vertices, faces, owners, count = [], [], [], 0
     for geom in geoms:
         mesh = int(host.geom_dataid[geom])
@@ -113,7 +113,7 @@ def _part(
         turned = data.geom_xmat.reshape(-1, 3, 3)
         frames = [(frames[0] - data.geom_xpos[geom]) @ turned[geom] for geom in geoms]
     best = int(np.argmin([np.prod(np.abs(frame).max(axis=0)) for frame in frames]))
-    return Part(
+    return RigidPart(
         geom=geoms[best] if moves else -1,
         geoms=tuple(geoms),
         vertices=frames[best].astype(np.float32),
@@ -133,7 +133,7 @@ class Tables:
       geom_face: each geom's first triangle in its part. geom_mesh: its own mesh.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[RigidPart, ...]
     data_id: Int[np.ndarray, "G"]
     face_geom: Int[np.ndarray, "F"]
     part_face: Int[np.ndarray, "P"]
@@ -151,7 +151,7 @@ class Tables:
         return np.array([g for part in self.parts for g in part.geoms if g != part.geom], int)
 
 
-def tables_of(host: mujoco.MjModel, parts: Sequence[Part]) -> Tables:
+def tables_of(host: mujoco.MjModel, parts: Sequence[RigidPart]) -> Tables:
     """Tables of these parts of a render model."""
     data_id, first = np.array(host.geom_dataid, np.int32), np.zeros(host.ngeom, np.int32)
     sizes = [len(part.faces) for part in parts]

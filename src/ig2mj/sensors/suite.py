@@ -28,7 +28,7 @@ from ig2mj.errors import EngineError, PluginError
 from ig2mj.geometry.poses import compose
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
-from ig2mj.sensors.base import Memory, Percept, Sensor, SensorOptions, Setup, Space
+from ig2mj.sensors.base import Percept, Sensor, SensorMemory, SensorOptions, Setup, Space
 from ig2mj.sensors.cameras import HEAD, CameraView, check_cameras, split_name
 from ig2mj.sensors.images import Camera, Images, Pose, RayPattern
 from ig2mj.sensors.registry import find_sensor
@@ -195,10 +195,10 @@ class SensorSuite:
         view: PhysicsView,
         states: ExtendedStates,
         controller: Any,
-        memory: Memory | None = None,
+        memory: SensorMemory | None = None,
         keys: UInt32[Array, "W 2"] | None = None,
         draw: Draw | None = None,
-    ) -> tuple[Readings, Memory | None]:
+    ) -> tuple[Readings, SensorMemory | None]:
         """Readings of all sensors, compiled where that helps.
 
         Args:
@@ -218,10 +218,10 @@ class SensorSuite:
         view: PhysicsView,
         states: ExtendedStates,
         controller: Any,
-        memory: Memory | None = None,
+        memory: SensorMemory | None = None,
         keys: UInt32[Array, "W 2"] | None = None,
         draw: Draw | None = None,
-    ) -> tuple[Readings, Memory | None]:
+    ) -> tuple[Readings, SensorMemory | None]:
         """`read`, not compiled."""
         seen, memory = self.look_fn(physics, view, states, controller, memory, keys, draw=draw)
         felt = self._feel(view, states, controller) if self._felt else {}
@@ -238,11 +238,11 @@ class SensorSuite:
         view: PhysicsView,
         states: ExtendedStates,
         controller: Any,
-        memory: Memory | None = None,
+        memory: SensorMemory | None = None,
         keys: UInt32[Array, "W 2"] | None = None,
         rendered: Bool[Array, "W"] | None = None,
         draw: Draw | None = None,
-    ) -> tuple[Readings, Memory | None]:
+    ) -> tuple[Readings, SensorMemory | None]:
         """Readings of the sensors that need images or rays; see `read`.
 
         Args:
@@ -257,15 +257,17 @@ class SensorSuite:
 
     # Memory.
 
-    def memory(self, view: PhysicsView, controller: Any) -> Memory | None:
+    def memory(self, view: PhysicsView, controller: Any) -> SensorMemory | None:
         """As after a reading of these worlds; None where no sensor needs one."""
         return self._remember(view, controller) if self._remembers else None
 
-    def _memory(self, view: PhysicsView, controller: Any) -> Memory:
+    def _memory(self, view: PhysicsView, controller: Any) -> SensorMemory:
         cameras = {c.setup.camera_name: c.setup.camera for c in self._seen if c.sensor.remembers}
         head = cameras.pop(HEAD, None) or next(iter(cameras.values()))
         others = {name: camera.pose(view, controller) for name, camera in cameras.items()}
-        return Memory(*head.pose(view, controller), jnp.asarray(view.body_pos), jnp.asarray(view.body_quat), others)
+        return SensorMemory(
+            *head.pose(view, controller), jnp.asarray(view.body_pos), jnp.asarray(view.body_quat), others
+        )
 
     def _poses_fn(self, view: PhysicsView, controller: Any, draw: Draw) -> tuple[dict[str, Pose], dict[str, Pose]]:
         """Of all cameras that are read, by their names in observations; and of everything that renderers are to be
@@ -290,9 +292,9 @@ class SensorSuite:
         controller: Any,
         eyes: dict[str, Pose],
         images: Sequence[Images],
-        memory: Memory | None,
+        memory: SensorMemory | None,
         keys: UInt32[Array, "W 2"] | None,
-    ) -> tuple[Readings, Memory | None]:
+    ) -> tuple[Readings, SensorMemory | None]:
         """Readings from images."""
         now = self._memory(view, controller) if self._remembers else None
         before, found = now if memory is None else memory, {}

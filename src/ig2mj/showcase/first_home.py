@@ -26,7 +26,7 @@ NEAR = 0.02
 
 
 @dataclasses.dataclass
-class Place:
+class FirstHomePlace:
     """Where one loose object is: "on top of" or "inside" something, or "loose" where no predicate holds."""
 
     object: str
@@ -45,7 +45,7 @@ def load_and_run(folder: pathlib.Path, seconds: float = SECONDS) -> tuple[Simula
     return world, float(moved.max(initial=0.0))
 
 
-def what_stands_where(world: Simulation) -> list[Place]:
+def what_stands_where(world: Simulation) -> list[FirstHomePlace]:
     """Every loose object with what it is on top of or inside of (paper table A.1), asked of the predicates.
 
     Of several answers the smallest object is named: the fish is in the pan rather than on the stove.
@@ -73,7 +73,7 @@ def what_stands_where(world: Simulation) -> list[Place]:
         _, relation, support = found.get(entry.name, (0.0, "loose", "-"))
         x, y = view.object_pos[0, scene.object_index(entry.name), :2]
         room = scene.rooms.room_at((float(x), float(y))) if scene.rooms else None
-        places.append(Place(entry.name, relation.replace("_", " "), support, room or "-"))
+        places.append(FirstHomePlace(entry.name, relation.replace("_", " "), support, room or "-"))
     return places
 
 

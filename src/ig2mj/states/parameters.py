@@ -22,7 +22,7 @@ Abilities = Mapping[str, Mapping[str, float | bool]]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Part:
+class HalfPose:
     """A half of a sliceable object, by object indices, with its base pose in the whole's base frame."""
 
     whole: int
@@ -94,12 +94,12 @@ class StateParameters:
 def parameters_of_manifest(manifest: Manifest, tables: SceneTables, compat: Compat = "paper") -> StateParameters:
     """The parameters of a scene as its manifest states them."""
     index = {name: i for i, name in enumerate(tables.object_names)}
-    parts = [Part(index[o.name], index[p.object], p.pos, p.quat) for o in manifest.objects for p in o.parts]
+    parts = [HalfPose(index[o.name], index[p.object], p.pos, p.quat) for o in manifest.objects for p in o.parts]
     return make_parameters(tables, [o.abilities for o in manifest.objects], parts, compat)
 
 
 def make_parameters(
-    tables: SceneTables, abilities: Sequence[Abilities], parts: Sequence[Part] = (), compat: Compat = "paper"
+    tables: SceneTables, abilities: Sequence[Abilities], parts: Sequence[HalfPose] = (), compat: Compat = "paper"
 ) -> StateParameters:
     """Turns abilities (one mapping per object) into arrays.
 

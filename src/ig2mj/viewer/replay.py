@@ -81,7 +81,7 @@ class Replay:
         """Opens the window; see `ig2mj.viewer.interactive.open_viewer`."""
         from ig2mj.viewer import interactive
 
-        interactive.launch(self, overlays=[*default_overlays(self.scene), Progress(self)], **options)
+        interactive.launch(self, overlays=[*default_overlays(self.scene), ReplayProgress(self)], **options)
 
     def video(self, file: str | os.PathLike, camera: Any = None, *, width: int = 640, height: int = 480) -> int:
         """Writes all finite steps as a video and says how many.
@@ -129,7 +129,7 @@ def _with_model(scene: Scene, model: mujoco.MjModel, file: str | os.PathLike) ->
     return dataclasses.replace(scene, model=model, tables=tables, looks=looks)
 
 
-class Progress:
+class ReplayProgress:
     """Overlay: which recorded step is shown, and why the world was dumped."""
 
     title = "replay"

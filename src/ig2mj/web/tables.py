@@ -11,7 +11,7 @@ import numpy as np
 
 from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.predicates.registry import OF_SUBSTANCES, PREDICATES
-from ig2mj.predicates.tree import Part, tree
+from ig2mj.predicates.tree import GoalPart, tree
 from ig2mj.states.definitions import from_physics
 from ig2mj.states.model import StateModel
 from ig2mj.states.registry import SPECS
@@ -108,14 +108,14 @@ def _step(number: int, text: str, state: str, more: str) -> str:
     return f"<div style='{_FONT}'>{line}{why}</div>"
 
 
-def _leaves(part: Part):
+def _leaves(part: GoalPart):
     if part.literal:
         yield part
     for inner in part.parts:
         yield from _leaves(inner)
 
 
-def _lines(part: Part, depth: int, lines: list[str]) -> None:
+def _lines(part: GoalPart, depth: int, lines: list[str]) -> None:
     colour = GOOD if part.fine else BAD
     mark = "&#10003;" if part.fine else "&#10007;"
     text = html.escape(part.text) if part.literal else f"<i>{html.escape(part.text)}</i>"

@@ -27,7 +27,7 @@ from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core, Policy
 from ig2mj.worlds.face import Face
 from ig2mj.worlds.random_streams import Seeds
-from ig2mj.worlds.recorder import LENGTH, Recording, frames_of, record, save_dump, start_recording
+from ig2mj.worlds.recorder import LENGTH, RecentSteps, frames_of, record, save_dump, start_recording
 
 
 @entry_point
@@ -43,7 +43,7 @@ class DebugWorlds(Face):
         self.core, self.scene, self.folder, self.length = core, scene, pathlib.Path(folder), length
         self.batch: Batch | None = None
         # Of each branch its last batch and its recording; the one that was stepped last comes first.
-        self._branches: list[tuple[weakref.ref[Batch], Recording]] = []
+        self._branches: list[tuple[weakref.ref[Batch], RecentSteps]] = []
 
     def start(self, seed: Seeds = 0) -> Batch:
         """All worlds at the start of their first episode, and an empty recording."""
@@ -109,7 +109,7 @@ class DebugWorlds(Face):
         """Number of a batch's branch. One that was changed by `core` itself counts as of the last one stepped."""
         return next((k for k, (last, _) in enumerate(self._branches) if last() is batch), 0)
 
-    def _report(self, batch: Batch, world: int, recording: Recording) -> str:
+    def _report(self, batch: Batch, world: int, recording: RecentSteps) -> str:
         scene = self.scene
         overflow = int(np.asarray(self.core.engine.health(batch.world.physics).overflow)[world])
         flags = int(np.asarray(batch.flags)[world])

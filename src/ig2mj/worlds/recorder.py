@@ -44,7 +44,7 @@ class Frames:
 
 
 @struct.dataclass
-class Recording:
+class RecentSteps:
     """A ring of the last S control steps of all worlds. `written`: steps recorded so far.
 
     `rings`: the arrays of `Frames`, in the order of its leaves, [S, W, ...]; `kind`: how they make up `Frames`.
@@ -60,17 +60,17 @@ class Recording:
 
 
 @entry_point
-def start_recording(engine: Engine, batch: Batch, length: int = LENGTH) -> Recording:
+def start_recording(engine: Engine, batch: Batch, length: int = LENGTH) -> RecentSteps:
     """A recording whose first step is the present state."""
     leaves, kind = jax.tree.flatten(_now(engine, batch))
-    return record(engine, Recording(_empty(leaves, length), jnp.zeros((), jnp.int32), kind), batch)
+    return record(engine, RecentSteps(_empty(leaves, length), jnp.zeros((), jnp.int32), kind), batch)
 
 
 @entry_point
-def record(engine: Engine, recording: Recording, batch: Batch) -> Recording:
+def record(engine: Engine, recording: RecentSteps, batch: Batch) -> RecentSteps:
     """Adds the present state, over the oldest one when full. Pure, and uses up the recording it is given."""
     rings = _put(recording.rings, recording.written % recording.length, jax.tree.leaves(_now(engine, batch)))
-    return Recording(rings, recording.written + 1, recording.kind)
+    return RecentSteps(rings, recording.written + 1, recording.kind)
 
 
 @functools.partial(jax.jit, static_argnums=1)
@@ -83,7 +83,7 @@ def _put(rings: tuple[Array, ...], place: Int[Array, ""], now: list[Array]) -> t
     return tuple(jnp.asarray(ring).at[place].set(a) for ring, a in zip(rings, now, strict=True))
 
 
-def frames_of(recording: Recording, world: int) -> Frames:
+def frames_of(recording: RecentSteps, world: int) -> Frames:
     """The recorded steps of one world, oldest first: [T, ...]. On the host."""
     written, length = int(recording.written), recording.length
     order = np.arange(max(0, written - length), written) % length

@@ -9,7 +9,7 @@ import numpy as np
 
 from ig2mj.engine.native.contacts import KnownForces
 from ig2mj.engine.native.nonfinite import why_lost
-from ig2mj.engine.native.one_world import World
+from ig2mj.engine.native.one_world import NativeWorld
 from ig2mj.engine.native.view_rows import FIELDS
 from ig2mj.engine.snapshot import FULLY_AWAKE, Snapshot
 from ig2mj.engine.view import PhysicsView
@@ -19,13 +19,13 @@ _OWN = frozenset({"data", "rows", "_copied", "_cvel", "_numbers", "_from_outside
 worlds replace and never change."""
 
 
-def clone(world: World, rows: dict[str, np.ndarray]) -> World:
+def clone(world: NativeWorld, rows: dict[str, np.ndarray]) -> NativeWorld:
     """Another world in exactly the same state.
 
     Args:
       rows: its rows of the working arrays, which hold copies of those of `world` already.
     """
-    new = World(world.statics, world.model_slot, rows, world.number)
+    new = NativeWorld(world.statics, world.model_slot, rows, world.number)
     mujoco.mj_copyData(new.data, world.model, world.data)
     for name, value in vars(world).items():
         if name not in _OWN:
@@ -33,7 +33,7 @@ def clone(world: World, rows: dict[str, np.ndarray]) -> World:
     return new
 
 
-def restore(world: World, snapshot: Snapshot, view: PhysicsView) -> None:
+def restore(world: NativeWorld, snapshot: Snapshot, view: PhysicsView) -> None:
     """Puts a world where a saved one was.
 
     Of a world that is not finite only the poses of the view are kept, and it stays lost until it is loaded.

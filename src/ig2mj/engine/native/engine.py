@@ -34,7 +34,7 @@ from ig2mj.engine.native.contacts import ForcePlan
 from ig2mj.engine.native.execution import HostExecution
 from ig2mj.engine.native.lazy_fields import RAW, LazyPlan
 from ig2mj.engine.native.model_slot import ModelSlot
-from ig2mj.engine.native.one_world import Statics, World
+from ig2mj.engine.native.one_world import NativeWorld, Statics
 from ig2mj.engine.native.physics import LiveWorlds, NativePhysics
 from ig2mj.engine.native.recorded import Cut, Pieces
 from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
@@ -130,13 +130,13 @@ class NativeEngine(HostExecution, SceneEngine):
     def reset(self) -> NativePhysics:
         """New worlds at the scene's initial state: its first keyframe, else the zero pose; everything awake."""
         live = self._new_worlds()
-        live.update(self._run(live, World.start))
+        live.update(self._run(live, NativeWorld.start))
         return live.current()
 
     def _new_worlds(self) -> LiveWorlds:
         arrays = self._working_arrays(self.num_worlds)
         worlds = [
-            World(self._statics, self._slots[share], {n: a[w] for n, a in arrays.items()}, int(w))
+            NativeWorld(self._statics, self._slots[share], {n: a[w] for n, a in arrays.items()}, int(w))
             for share, numbers in enumerate(self._shares)
             for w in numbers
         ]
@@ -159,7 +159,7 @@ class NativeEngine(HostExecution, SceneEngine):
     def _start(self) -> Snapshot:
         """World 0 of a reset."""
         rows = {name: array[0] for name, array in self._working_arrays(1).items()}
-        world = World(self._statics, self._slots[0], rows, 0)
+        world = NativeWorld(self._statics, self._slots[0], rows, 0)
         self._slots[0].put(world.fields)
         world.start()
         return world.save()
@@ -211,7 +211,7 @@ class NativeEngine(HostExecution, SceneEngine):
         if "eq_data" in rows:
             rows["eq_data"] = self._in_double_precision(rows["eq_data"])
 
-        def apply(world: World) -> int:
+        def apply(world: NativeWorld) -> int:
             if world.lost:
                 return Changed.NOTHING
             return apply_write(world, {name: value[world.number] for name, value in rows.items()})
@@ -275,7 +275,7 @@ class NativeEngine(HostExecution, SceneEngine):
         batched = snapshot.time.ndim == 1
         chosen = np.ones(self.num_worlds, bool) if mask is None else np.asarray(mask, bool)
 
-        def replace(world: World) -> int:
+        def replace(world: NativeWorld) -> int:
             if not chosen[world.number]:
                 return Changed.NOTHING
             return world.load(jax.tree.map(lambda a: np.asarray(a[world.number]), snapshot) if batched else snapshot)
@@ -289,7 +289,7 @@ class NativeEngine(HostExecution, SceneEngine):
         """Raises StaleStateError where the worlds have changed since this handle was returned."""
         self._live(physics)
 
-    def worlds(self, physics: NativePhysics) -> list[World]:
+    def worlds(self, physics: NativePhysics) -> list[NativeWorld]:
         """The worlds of a handle. Raises StaleStateError."""
         return self._live(physics).worlds
 
@@ -342,7 +342,7 @@ class NativeEngine(HostExecution, SceneEngine):
         one.model_slot.put(one.fields)
         return one.model, one.data
 
-    def _run(self, live: LiveWorlds, act: Callable[[World], int]) -> int:
+    def _run(self, live: LiveWorlds, act: Callable[[NativeWorld], int]) -> int:
         """Does something to every world, each share of the worlds on its own thread and with its own model."""
 
         failures: list[EngineError] = []
@@ -359,7 +359,7 @@ class NativeEngine(HostExecution, SceneEngine):
         return changed
 
 
-def _act_on(worlds: list[World], act: Callable[[World], int], failures: list[EngineError]) -> int:
+def _act_on(worlds: list[NativeWorld], act: Callable[[NativeWorld], int], failures: list[EngineError]) -> int:
     """Does something to worlds of one thread; says what changed."""
     changed = Changed.NOTHING
     for world in worlds:

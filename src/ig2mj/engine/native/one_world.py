@@ -53,7 +53,7 @@ class Statics:
     incremental: bool
 
 
-class World:
+class NativeWorld:
     """One world.
 
     Attributes:

@@ -16,7 +16,7 @@ import numpy as np
 from ig2mj.engine.native.contacts import FingerForces
 from ig2mj.engine.native.copying import clone, restore
 from ig2mj.engine.native.lazy_fields import RAW, Agents, ObjectMotion
-from ig2mj.engine.native.one_world import Statics, World
+from ig2mj.engine.native.one_world import NativeWorld, Statics
 from ig2mj.engine.native.view_rows import FIELDS, OF_AGENTS, Changed
 from ig2mj.engine.saved import SavedPhysics
 from ig2mj.engine.view import AgentView, LazyFields, PhysicsView, but_agents, fields_of
@@ -30,11 +30,11 @@ class LiveWorlds:
 
     Attributes:
       generation: how many times they were stepped, written to or loaded.
-      worlds: one `World` each. arrays: [W, ...] working arrays, by field of the view; never handed out.
+      worlds: one `NativeWorld` each. arrays: [W, ...] working arrays, by field of the view; never handed out.
       view: the view last made; while nothing moves, the same object is handed out again.
     """
 
-    def __init__(self, worlds: list[World], arrays: dict[str, np.ndarray], statics: Statics):
+    def __init__(self, worlds: list[NativeWorld], arrays: dict[str, np.ndarray], statics: Statics):
         self.worlds, self.arrays, self.statics = worlds, arrays, statics
         self.generation = 0
         self.view: PhysicsView | None = None
@@ -137,7 +137,7 @@ class NativePhysics:
         self.generation = generation
 
     @property
-    def worlds(self) -> list[World]:
+    def worlds(self) -> list[NativeWorld]:
         """The worlds. Raises StaleStateError: they have changed since this handle was made."""
         return self.live().worlds
 

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from ig2mj.engine.layout import ModelLayout
-from ig2mj.engine.native.one_world import World
+from ig2mj.engine.native.one_world import NativeWorld
 from ig2mj.engine.snapshot import AXIS
 
 _IN_ORDER = {
@@ -51,7 +51,7 @@ class Cut(NamedTuple):
 
 
 class Pieces:
-    """Makes the pieces of a world. Attributes: cuts: of the leaves of `World.save()`, in the order of its pytree."""
+    """Makes the pieces of a world. Attributes: cuts: of leaves of `NativeWorld.save()`, in the order of its pytree."""
 
     def __init__(self, model: mujoco.MjModel, layout: ModelLayout, own_fields: tuple[str, ...]):
         """Finds the places of both parts."""
@@ -72,7 +72,7 @@ class Pieces:
         time, fields = Cut(0, 0, 1, ()), [Cut(7 + k) for k in range(len(own_fields))]
         self.cuts = [*scene, Cut(4), *agents, Cut(5), Cut(6), time, *fields]
 
-    def __call__(self, world: World) -> list[np.ndarray]:
+    def __call__(self, world: NativeWorld) -> list[np.ndarray]:
         """Of a world's present state. They are not changed later, and must not be."""
         data, vector = world.data, np.empty(self._size)
         mujoco.mj_getState(world.model, data, vector, self._which)

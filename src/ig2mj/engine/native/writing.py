@@ -8,7 +8,7 @@ from jaxtyping import Bool
 
 from ig2mj.engine.grasp_release import moved_grasps, without_moved
 from ig2mj.engine.model_fields import MOVING, NAMES
-from ig2mj.engine.native.one_world import World
+from ig2mj.engine.native.one_world import NativeWorld
 from ig2mj.engine.native.sleep import wake_trees
 from ig2mj.engine.native.view_rows import Changed
 
@@ -17,7 +17,7 @@ SLACK = 1e-4
 float32."""
 
 
-def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
+def apply_write(world: NativeWorld, rows: dict[str, np.ndarray]) -> int:
     """Applies one world's rows of a `Write` (its fields, and those of the model, that are not None) and refreshes it.
 
     Without any rows the world is refreshed from what stands in its MjData. Grasps of what moves end, unless the rows
@@ -69,7 +69,7 @@ def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
     return world.clear_force() | world.refresh()
 
 
-def _with_releases(world: World, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _with_releases(world: NativeWorld, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The rows, and constraints and ignored contacts without the grasps of what they move."""
     layout = world.statics.layout
     if not len(layout.grasp_equality) or "eq_active" in rows:
@@ -79,14 +79,14 @@ def _with_releases(world: World, rows: dict[str, np.ndarray]) -> dict[str, np.nd
     return rows if moved is None or not moved.any() else _released(world, moved) | rows
 
 
-def _released(world: World, moved: Bool[np.ndarray, "1 grasps"]) -> dict[str, np.ndarray]:
+def _released(world: NativeWorld, moved: Bool[np.ndarray, "1 grasps"]) -> dict[str, np.ndarray]:
     """Rows without the grasps of what moved."""
     active = world.data.eq_active[None].astype(bool)
     after = without_moved(np, world.statics.layout, moved, active, world.ignored[None])
     return {"eq_active": after[0][0], "ignored_contacts": after[1][0]}
 
 
-def _moved_by_hand(world: World) -> Bool[np.ndarray, "1 grasps"] | None:
+def _moved_by_hand(world: NativeWorld) -> Bool[np.ndarray, "1 grasps"] | None:
     """Grasps whose bodies no longer stand to each other as they did when the world was last looked at, since somebody
     changed MuJoCo's own data. None: none."""
     data, layout = world.data, world.statics.layout
@@ -112,7 +112,7 @@ def _relative(pos: list[np.ndarray], quat: list[np.ndarray]) -> tuple[np.ndarray
 
 
 def _put(
-    world: World, qposadr: np.ndarray, dofadr: np.ndarray, pos: np.ndarray, quat: np.ndarray, trees: np.ndarray
+    world: NativeWorld, qposadr: np.ndarray, dofadr: np.ndarray, pos: np.ndarray, quat: np.ndarray, trees: np.ndarray
 ) -> None:
     """Puts free joints [n] at poses [n, 3], [n, 4], at rest, and marks their trees."""
     world.data.qpos[qposadr[:, None] + np.arange(7)] = np.concatenate([pos, quat], 1)
@@ -120,7 +120,7 @@ def _put(
     trees[world.model.dof_treeid[dofadr]] = True
 
 
-def _take_along(world: World, moved: np.ndarray, pos: np.ndarray, quat: np.ndarray, trees: np.ndarray) -> None:
+def _take_along(world: NativeWorld, moved: np.ndarray, pos: np.ndarray, quat: np.ndarray, trees: np.ndarray) -> None:
     """Moves split-off bodies rigidly with the main bodies, which are about to move to pos, quat."""
     layout, qpos = world.statics.layout, world.data.qpos
     for k in np.flatnonzero(np.isin(layout.extra_object, moved)):

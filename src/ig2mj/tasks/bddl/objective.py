@@ -18,7 +18,7 @@ from ig2mj.states.world import ExtendedStates
 
 
 @struct.dataclass
-class Progress:
+class GoalProgress:
     """Share of the goal that holds, in every world."""
 
     share: Float[Array, "W"]
@@ -51,28 +51,28 @@ class BddlObjective:
         states: ExtendedStates,
         status: GoalStatus,
         row: Int[Array, "W"] | None,
-        before: Progress | None = None,
+        before: GoalProgress | None = None,
         action: Float[Array, "W n"] | None = None,
-    ) -> Progress:
-        return Progress(jnp.asarray(status.fraction, jnp.float32))
+    ) -> GoalProgress:
+        return GoalProgress(jnp.asarray(status.fraction, jnp.float32))
 
-    def rewards(self, before: Progress, now: Progress) -> dict[str, Float[Array, "W"]]:
+    def rewards(self, before: GoalProgress, now: GoalProgress) -> dict[str, Float[Array, "W"]]:
         """iGibson's: how much the share grew."""
         return {"goal": now.share - before.share}
 
-    def ended(self, now: Progress, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
+    def ended(self, now: GoalProgress, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
         """Success ends an episode; there is no failure."""
         holds = jnp.asarray(status.holds)
         return holds, holds
 
-    def info(self, view: PhysicsView, now: Progress, status: GoalStatus) -> dict[str, Array]:
+    def info(self, view: PhysicsView, now: GoalProgress, status: GoalStatus) -> dict[str, Array]:
         return {"goal_progress": now.share}
 
     def observe(
         self,
         view: PhysicsView,
         states: ExtendedStates,
-        now: Progress,
+        now: GoalProgress,
         status: GoalStatus,
         time_left: Float[Array, "W"],
     ) -> dict[str, Float[Array, "W n"]]:

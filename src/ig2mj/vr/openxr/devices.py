@@ -59,7 +59,7 @@ class Graphics(Protocol):
 
 
 @dataclasses.dataclass(frozen=True)
-class Frame:
+class DeviceFrame:
     """Of the runtime. `time`: ns, when it will be seen. `draw`: images are needed."""
 
     time: int
@@ -195,7 +195,7 @@ class Headset:
 
     # Frames.
 
-    def wait(self) -> Frame | None:
+    def wait(self) -> DeviceFrame | None:
         """Waits for the runtime's next frame and begins it; None while the session does not run."""
         xr = self._xr
         self._events()
@@ -205,9 +205,9 @@ class Headset:
         state = xr.wait_frame(self._session)
         xr.begin_frame(self._session)
         self._time = int(state.predicted_display_time)
-        return Frame(self._time, bool(state.should_render) and self._graphics is not None)
+        return DeviceFrame(self._time, bool(state.should_render) and self._graphics is not None)
 
-    def locate(self, frame: Frame) -> tuple[PoseFrame, tuple[Eye, Eye] | None]:
+    def locate(self, frame: DeviceFrame) -> tuple[PoseFrame, tuple[Eye, Eye] | None]:
         """Devices and eyes at the time at which a frame will be seen, in the play area."""
         xr = self._xr
         active = (xr.ActiveActionSet * 1)(xr.ActiveActionSet(self._set, 0))
@@ -228,7 +228,7 @@ class Headset:
         _, self._views = xr.locate_views(self._session, info)
         return found, (self._eye(self._views[0]), self._eye(self._views[1]))
 
-    def end(self, frame: Frame, drawn: bool = False) -> None:
+    def end(self, frame: DeviceFrame, drawn: bool = False) -> None:
         """Hands a frame over. `drawn`: images of the views located last belong to it."""
         xr = self._xr
         layers = []

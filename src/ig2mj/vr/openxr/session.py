@@ -15,7 +15,7 @@ from typing import Any
 from ig2mj.envs.environment import Environment
 from ig2mj.vr.fed_poses import FedPoses
 from ig2mj.vr.frames import PoseFrame
-from ig2mj.vr.openxr.devices import Frame, Headset
+from ig2mj.vr.openxr.devices import DeviceFrame, Headset
 from ig2mj.vr.openxr.egl import EglGraphics
 from ig2mj.vr.play_area import moved
 from ig2mj.vr.session import Session
@@ -75,7 +75,7 @@ class HeadsetLoop:
                 self._headset.ask_to_end()
             self.frame()
 
-    def _draw(self, frame: Frame, eyes: tuple[Eye, Eye] | None) -> bool:
+    def _draw(self, frame: DeviceFrame, eyes: tuple[Eye, Eye] | None) -> bool:
         poses = self._session.track.at()
         if self._graphics is None or eyes is None or poses is None:
             return False
