@@ -68,7 +68,7 @@ def _one_core() -> tuple[str, list[tuple[str, str]]]:
 
 
 def _one_gpu() -> tuple[str, list[tuple[str, str]]]:
-    """Rows of one commit, card and protocol, as `speed.suite readme` measures them. What it did not measure is left empty."""
+    """Rows of one commit, card and protocol, as `speed.suite readme` measures them. What was not measured is empty."""
     rows = [json.loads(line) for line in (RESULTS / "speed" / "rows.jsonl").read_text(encoding="utf-8").splitlines()]
     [(commit, device, protocol)] = {(row["commit"], row["device"], row.get("protocol", SUITE)) for row in rows}
 
