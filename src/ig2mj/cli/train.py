@@ -123,6 +123,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
 
     from ig2mj.cli.common.objects import note_changes
     from ig2mj.cli.train_videos import TrainingVideos
+    from ig2mj.cluster.process_per_gpu import run_on_each_gpu, visible_gpus
     from ig2mj.cluster.process_topology import find_topology
     from ig2mj.cluster.team import Team
     from ig2mj.envs.registry import VECTORS, make
@@ -147,6 +148,11 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
     algo, obs, seed, devices = chosen.algo, chosen.obs, chosen.seed, chosen.devices
     former = None if chosen.init_from is None else initial_policy(chosen.init_from)
     topology = find_topology(os.environ)
+    if topology is None and devices != "1" and sys.argv[1:2] == ["train"]:
+        gpus = visible_gpus(os.environ)
+        gpus = gpus if devices == "all" else gpus[: int(devices)]
+        if len(gpus) > 1 and devices in ("all", str(len(gpus))):
+            return run_on_each_gpu(gpus, [sys.executable, "-m", "ig2mj", *sys.argv[1:]], os.environ)
     if devices != "1" or (topology and topology.count > 1):
         keep_scratch_in_place()
     team = Team.join(topology)

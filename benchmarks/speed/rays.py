@@ -1,0 +1,149 @@
+"""Microseconds of an image by the ray caster, by parts and by variants, and how far a variant's images differ.
+
+    python -m benchmarks.speed.rays [--task NAME] [--worlds 1024] [--looks day] [--rows FILE] [--variants NAME ...]
+
+One GPU. Start states of a task's home; the robot's eye, 128 x 128, RGB and depth, once a call, from the same worlds
+each time. Variants are timed in turns, `--rounds` times, next to the ray caster as it is (`base`):
+
+- `refit`, `depth`: parts of `base`: the boxes of what moves alone, and images without colour.
+- `leaf_N`: triangles in a leaf of the trees of merged meshes. `cubql`, `median`: how these trees are built.
+- `block_N`: threads of a block; a tile of 64 rays is one or several of them.
+- `size_N`: images of other sizes. `cameras_N`: the eye and N - 1 of the robot's other cameras.
+
+`differs`: share of pixels that differ from `base` by more than 1 of 255 in a channel; `most`: the largest difference.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import dataclasses
+import pathlib
+import statistics
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+from mujoco import mjx
+
+import ig2mj
+from benchmarks.harness.results import keep_row, machine
+from benchmarks.speed.batch import device
+from ig2mj.scene.scene import LOOKS
+from ig2mj.sensors import ray_caster
+from ig2mj.sensors.batch_camera import BatchCamera
+from ig2mj.sensors.particle_slots import fill_slots
+from ig2mj.worlds.draw import Draw
+
+VARIANTS = (
+    *("base", "refit", "depth", "leaf_1", "leaf_4", "leaf_8", "cubql", "median"),
+    *("block_32", "block_128", "block_256", "size_64", "size_224", "cameras_3"),
+)
+
+
+@contextlib.contextmanager
+def built(variant: str) -> Iterator[None]:
+    """Trees of merged meshes are built as the variant says."""
+    before = ray_caster.LEAF, ray_caster.CONSTRUCTOR
+    if variant.startswith("leaf_"):
+        ray_caster.LEAF = int(variant[5:])
+    if variant in ("cubql", "median"):
+        ray_caster.CONSTRUCTOR = variant
+    try:
+        yield
+    finally:
+        ray_caster.LEAF, ray_caster.CONSTRUCTOR = before
+
+
+def camera_of(env: Any, variant: str, looks: str) -> BatchCamera:
+    """The camera of a variant."""
+    scene = env.core.engine.scene
+    model, tables = scene.model, scene.tables
+    eye = model.camera(int(tables.agent_camera[0])).name
+    own = [model.camera(k).name for k in range(model.ncam) if tables.body_agent[model.cam_bodyid[k]] == 0]
+    count = int(variant[8:]) if variant.startswith("cameras_") else 1
+    names = [eye, *(name for name in own if name != eye)][:count]
+    if len(names) < count:
+        raise SystemExit(f"error: the robot has {len(names)} cameras, not {count}")
+    size = int(variant[5:]) if variant.startswith("size_") else 128
+    shape = {"width": size, "height": size, "rgb": variant != "depth", "depth": True}
+    with built(variant):
+        camera = BatchCamera(env.core.engine, env.core.rules.model, names, looks=looks, **shape)
+    if variant.startswith("block_"):
+        impl = camera._model._impl
+        blocks = dataclasses.replace(impl.block_dim, render=int(variant[6:]))
+        camera._model = camera._model.replace(_impl=impl.replace(block_dim=blocks))
+    return camera
+
+
+def program_of(camera: BatchCamera, variant: str, world: Any) -> Callable[[], Any]:
+    """One call of the variant, compiled; its arguments stay on the device."""
+    if variant == "refit":
+
+        def refit(physics: Any, view: Any, states: Any) -> Any:
+            slots = fill_slots(camera.model, states, view, camera.slots)
+            moved = camera._moved(physics, slots, {}, None, Draw())
+            return jax.vmap(lambda d: mjx.refit_bvh(camera._model, d, camera._handle)._impl._jax_token)(moved)
+
+        act = jax.jit(refit)
+    else:
+        act = jax.jit(lambda physics, view, states: (lambda i: (i.rgb, i.depth))(camera(physics, view, states)))
+    return lambda: jax.block_until_ready(act(world.physics, world.view, world.states))
+
+
+def compared(images: Any, base: Any) -> dict[str, float]:
+    """How far colours are from those of `base`; nothing where they are of another shape."""
+    if images is None or images[0] is None or base is None or np.shape(images[0]) != np.shape(base[0]):
+        return {}
+    apart = np.abs(np.asarray(images[0], np.int16) - np.asarray(base[0], np.int16)).max(-1)
+    return {"differs": round(float((apart > 1).mean()), 7), "most": int(apart.max())}
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--task", default="CookingMeat")
+    parser.add_argument("--worlds", type=int, default=1024)
+    parser.add_argument("--looks", choices=LOOKS, default="day")
+    parser.add_argument("--variants", nargs="*", default=VARIANTS)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--calls", type=int, default=10, help="calls of a variant in a round")
+    parser.add_argument("--rows", type=pathlib.Path, help="file for the rows; default: they are printed")
+    args = parser.parse_args(argv)
+    env = ig2mj.make(args.task, worlds=args.worlds, engine="warp")
+    world = env.reset(0).batch.world
+    programs, images = dict[str, Callable[[], Any]](), dict[str, Any]()
+    for variant in dict.fromkeys(("base", *args.variants)):
+        try:
+            program = program_of(camera_of(env, variant, args.looks), variant, world)
+            images[variant] = jax.tree.map(np.asarray, program()) if variant != "refit" else (program(), None)[1]
+        except Exception as failure:
+            print(f"{variant}: {type(failure).__name__}: {str(failure).splitlines()[0][:200]}", flush=True)
+            continue
+        programs[variant] = program
+        program()
+    spent: dict[str, list[float]] = {variant: [] for variant in programs}
+    for _ in range(args.rounds):
+        for variant, program in programs.items():
+            began = time.perf_counter()
+            for _ in range(args.calls):
+                program()
+            spent[variant].append((time.perf_counter() - began) / args.calls)
+    for variant, seconds in spent.items():
+        count = args.worlds * (int(variant[8:]) if variant.startswith("cameras_") else 1)
+        row = {
+            "benchmark": "rays",
+            "variant": variant,
+            "looks": args.looks,
+            "home": env.task.home,
+            "worlds": args.worlds,
+            "us_per_image": round(1e6 * statistics.median(seconds) / count, 3),
+            "ms_per_call": [round(1e3 * s, 3) for s in seconds],
+            **compared(images.get(variant), images["base"]),
+        }
+        keep_row(row | device() | machine(-1), args.rows)
+
+
+if __name__ == "__main__":
+    main()
