@@ -1,0 +1,27 @@
+"""Programs of a batch of worlds as arrays."""
+
+import numpy as np
+
+from ig2mj.planning import execution
+from ig2mj.planning.phases import Phase, Programs
+
+
+def test_new_programs_of_some_worlds_leave_the_others_as_they_are():
+    long = [Phase(yaw=float(k), limit=10 + k) for k in range(5)]
+    carry = execution.begin([[Phase(yaw=7.0)], [], [Phase(yaw=8.0), Phase(yaw=9.0)]])
+    new = execution.begin_some(carry, {1: long})
+    assert new.programs.length.tolist() == [1, 5, 2]
+    assert new.programs.yaw[0, 0] == 7.0 and new.programs.yaw[2, :2].tolist() == [8.0, 9.0]
+    assert new.programs.limit[1].tolist() == [10, 11, 12, 13, 14]
+    assert new.running.tolist() == [True, True, True] and not carry.running[1]
+    over = execution.begin_some(new, {0: [], 2: []})
+    assert over.running.tolist() == [False, True, False] and over.status[0] == execution.DONE
+
+
+def test_a_batch_that_is_packed_at_once_is_the_same():
+    programs = [[Phase(hand=0, pos=(1.0, 2.0, 3.0))], [Phase(rise=0.1), Phase(close=True)]]
+    one = Programs.pack(programs)
+    two = execution.begin_some(execution.begin([[], []]), dict(enumerate(programs))).programs
+    for name in ("length", "base", "pos", "moves", "hand", "close", "limit", "after"):
+        a, b = getattr(one, name), getattr(two, name)
+        assert np.array_equal(a[..., : b.shape[-1]] if a.shape != b.shape else a, b), name
