@@ -115,16 +115,13 @@ def make_algorithm(
         perception = with_object_targets(perception, env.privileged_names, camera_projection(env, perception))
         encoder = glimpses.encoder_of(perception)
     if isinstance(config, SACConfig):
-        adviser = expert_of(env) if expert else None
+        adviser = _expert_of(env) if expert else None
         return SAC(perception, size, config, axis, demos, adviser, horizon=horizon, encoder=encoder)
     if isinstance(config, PPOConfig):
         return PPO(perception, size, config, axis)
-    helper, unlabelled, memory, o = expert_of(env), None, None, occlusion
-    if isinstance(helper, PlannedExpert):
-        if env.pure:
-            raise Ig2mjError("the planner is no part of a compiled program (--set engine=native)")
-        if o != NO_OCCLUSION:
-            raise Ig2mjError("settings of occlusion are for scripted experts, not for the planner")
+    helper, unlabelled, memory, o = _expert_of(env), None, None, occlusion
+    if isinstance(helper, PlannedExpert) and o != NO_OCCLUSION:
+        raise Ig2mjError("settings of occlusion are for scripted experts, not for the planner")
     adviser: Any = helper
     if o.object_memory != "none":
         readings = getattr(env.core.controllers[0], "hand_readings", ())
@@ -135,3 +132,11 @@ def make_algorithm(
         unlabelled = start_images(env, perception, o.pretrain_images, helper, o.pretrain_expert_steps)
     parts: dict[str, Any] = {"horizon": horizon, "encoder": encoder, "memory": memory, "demos": demos}
     return Dagger(perception, size, adviser, config, axis, unlabelled, **parts)
+
+
+def _expert_of(env: Any) -> Any:
+    """The expert of an environment, which gives labels while it is stepped. Raises Ig2mjError: it cannot there."""
+    found = expert_of(env)
+    if isinstance(found, PlannedExpert) and env.pure:
+        raise Ig2mjError("the planner is no part of a compiled program (--set engine=native)")
+    return found
