@@ -96,8 +96,8 @@ class _Run:
         self.logs = args.out / "logs"
         self.logs.mkdir(exist_ok=True)
         self.conditions = {name: getattr(args, name) for name in CONDITIONS}
-        self.varied = {name: getattr(args, name) for name, usual in DEFAULTS.items() if getattr(args, name) != usual}
-        self.conditions |= self.varied
+        varied = {name: getattr(args, name, usual) for name, usual in DEFAULTS.items()}
+        self.conditions |= {name: value for name, value in varied.items() if value != DEFAULTS[name]}
         self.stopped = threading.Event()
         self.began = time.monotonic()
         self.made_by = {**provenance(), "versions": versions()}

@@ -4,8 +4,8 @@
     python -m benchmarks.planning.page --requests FILE   takes in rows of `ig2mj plan --benchmark --out FILE`
     python -m benchmarks.planning.page                   writes the page from what was taken in before
 
-What is taken in is one line for each activity in benchmarks/results/planning/<rung>.jsonl, and one for each primitive
-in requests.jsonl next to them.
+What is taken in is one line for each activity in benchmarks/results/planning/<rung>.jsonl, one for each primitive in
+requests.jsonl, and one for each other agent or condition of physics in comparisons.jsonl next to them.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ from typing import Any
 
 from benchmarks.harness.paths import RESULTS, ROOT
 from benchmarks.planning.activities import RUNGS, read_rows
+from benchmarks.planning.worker import DEFAULTS
 from ig2mj.cli.common.plan_benchmark import COLUMNS, figure_cells, primitive_figures
 from ig2mj.planning.steps import PRIMITIVES, REASONS
 
 FOLDER = RESULTS / "planning"
 PAGE = ROOT / "docs" / "notes" / "planned_activities.md"
-REQUESTS = "requests.jsonl"
+REQUESTS, COMPARISONS = "requests.jsonl", "comparisons.jsonl"
 ENOUGH = 0.8
 """Share of starts with which an activity counts as solved."""
 SHOWN = 2
@@ -48,11 +49,17 @@ def main() -> None:
     for rung in RUNGS:
         files = [file for folder in args.rows if (file := folder / f"{rung}.jsonl").is_file()]
         if files:
-            take_in(read_rows(files), args.results / f"{rung}.jsonl")
+            rows = read_rows(files)
+            main = [row for row in rows if not condition_of(row)]
+            if main:
+                take_in(main, args.results / f"{rung}.jsonl")
+            if rung == "physics":
+                take_in_comparisons([row for row in rows if condition_of(row)], main, args.results / COMPARISONS)
     if args.requests:
         take_in_requests([row for file in args.requests for row in read_lines(file)], args.results / REQUESTS)
     kept = {rung: read_lines(args.results / f"{rung}.jsonl") for rung in RUNGS}
-    args.page.write_text(page(kept, read_lines(args.results / REQUESTS)), encoding="utf-8")
+    others = read_lines(args.results / REQUESTS), read_lines(args.results / COMPARISONS)
+    args.page.write_text(page(kept, *others), encoding="utf-8")
     print(args.page)
 
 
@@ -120,6 +127,44 @@ def condensed(name: str, rows: Sequence[Row]) -> Row:
     }
 
 
+def condition_of(row: Row) -> str:
+    """By what a row differs from the main ones, such as "--doors shut"; "" for a main one."""
+    conditions = row["conditions"]
+    found = {"doors": conditions["doors"]} if conditions.get("doors") == "shut" else {}
+    found |= {name: conditions[name] for name in DEFAULTS if name in conditions}
+    return " ".join(f"--{name} {value}" for name, value in found.items())
+
+
+def take_in_comparisons(rows: Sequence[Row], main: Sequence[Row], file: pathlib.Path) -> None:
+    """Replaces the lines of the rows' conditions. `main`: main rows, for those of the same starts."""
+    known = {line["condition"]: line for line in read_lines(file)}
+    solved = {(row["activity"], row["start"]): int(row["success"]) for row in main}
+    for condition in sorted({condition_of(row) for row in rows}):
+        own = [row for row in rows if condition_of(row) == condition]
+        failed = collections.Counter(
+            f"{step['primitive']}: {step['reason']}" for row in own for step in row["steps"] if step["reason"]
+        )
+        same = [solved[key] for row in own if (key := (row["activity"], row["start"])) in solved]
+        known[condition] = {
+            "condition": condition,
+            "activities": len({row["activity"] for row in own}),
+            "starts": len(own),
+            "solved": sum(row["success"] for row in own),
+            "q": round(statistics.mean(row["q"] for row in own), 3),
+            "main_starts": len(same),
+            "main_solved": sum(same),
+            "crashed": sum(row["crashed"] for row in own),
+            "failures": dict(failed.most_common(6)),
+            "ended": dict(collections.Counter(r["ended"] for r in own if not r["success"]).most_common(3)),
+            "commits": sorted({row["commit"] for row in own}),
+            "commands": sorted({row["command"] for row in own}),
+            "versions": own[-1]["versions"],
+        }
+    if known:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text("".join(json.dumps(known[name]) + "\n" for name in sorted(known)), encoding="utf-8")
+
+
 def take_in_requests(rows: Sequence[Row], file: pathlib.Path) -> None:
     """Replaces the lines of the rows' rungs and primitives."""
     known = {(line["conditions"]["rung"], line["primitive"]): line for line in read_lines(file)}
@@ -138,7 +183,7 @@ def take_in_requests(rows: Sequence[Row], file: pathlib.Path) -> None:
 # From lines to the page.
 
 
-def page(kept: dict[str, list[Row]], requests: Sequence[Row] = ()) -> str:
+def page(kept: dict[str, list[Row]], requests: Sequence[Row] = (), comparisons: Sequence[Row] = ()) -> str:
     """The page's text."""
     kept = {rung: lines for rung, lines in kept.items() if lines}
     conditions = next((lines[0]["conditions"] for lines in kept.values()), {})
@@ -174,6 +219,7 @@ def page(kept: dict[str, list[Row]], requests: Sequence[Row] = ()) -> str:
         *_primitives(kept),
         "",
         *_requests(requests),
+        *_comparisons(comparisons),
         "## Provenance",
         "",
         *_provenance(kept, requests),
@@ -300,6 +346,27 @@ def _requests(lines: Sequence[Row]) -> list[str]:
         "a solution.",
         "",
         *_table(("rung", *(c.replace("?", "") for c in COLUMNS)), rows),
+        "",
+    ]
+
+
+def _comparisons(lines: Sequence[Row]) -> list[str]:
+    """The section on other agents and conditions; none where none were measured."""
+    if not lines:
+        return []
+    rows = []
+    for line in lines:
+        said = [f"{name} ({count})" for name, count in line["failures"].items()][: 2 * SHOWN]
+        same = f"{line['main_solved']} of {line['main_starts']}" if line["main_starts"] else "-"
+        cells = [f"`{line['condition']}`", str(line["activities"]), str(line["starts"]), str(line["solved"]), same]
+        rows.append([*cells, f"{line['q']:.2f}", "; ".join(said or list(line["ended"])[:1]).replace("|", "/")])
+    head = ("condition", ">activities", ">starts", ">solved", ">main rows on the same starts", ">mean q", "failures")
+    return [
+        "## Other agents and conditions",
+        "",
+        "In physics, from the same start states ([comparisons](../guide/planning.md#comparisons)).",
+        "",
+        *_table(head, rows),
         "",
     ]
 

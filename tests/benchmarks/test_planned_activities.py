@@ -76,3 +76,16 @@ def test_rows_of_two_protocols_are_not_mixed(arguments):
     rows[0]["conditions"]["doors"] = "shut"
     with pytest.raises(ValueError, match="different conditions"):
         pages.condensed("making_tea", rows)
+
+
+def test_other_agents_are_compared_on_the_same_starts_and_leave_the_main_rows_alone(arguments, tmp_path):
+    arguments.doors = "open"
+    main = list(run(arguments).values())
+    arguments.agent = "random"
+    other = [row for row in run(arguments).values() if "agent" in row["conditions"]]
+    assert len(other) == 3 and not any(pages.condition_of(row) for row in main)
+    other[0] |= {"success": False, "q": 0.0, "steps": [{**STEP, "reason": "no_grasp"}]}
+    pages.take_in_comparisons(other, main, tmp_path / "comparisons.jsonl")
+    (line,) = pages.read_lines(tmp_path / "comparisons.jsonl")
+    text = pages.page({"physics": []}, (), [line])
+    assert "| `--agent random` | 1 | 3 | 2 | 3 of 3 | 0.67 | open: no_grasp (1) |" in text
