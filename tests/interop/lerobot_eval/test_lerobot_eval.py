@@ -35,6 +35,7 @@ def test_a_rollout_of_lerobots_reads_success_and_tasks(monkeypatch):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     env = module.make_env(n_envs=2, use_async_envs=False)
+    env.env = env.env.with_horizon(12)
     check_env_attributes_and_types(env)
     obs, _ = env.reset(seed=[1, 2])
     seen = add_envs_task(env, preprocess_observation(obs))
