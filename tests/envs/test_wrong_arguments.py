@@ -99,6 +99,15 @@ def test_what_is_no_state_is_refused(env, action):
         env.step(None, action)
     with pytest.raises(ActionError, match="not dict"):
         env.step_autoreset(env.reset(0).obs, action)
+    for call in (env.fork, env.check, lambda state: env.save(state, "state.npz")):
+        with pytest.raises(ActionError, match="not NoneType"):
+            call(None)
+
+
+@pytest.mark.parametrize(("name", "value"), [("home", 3), ("robot", 3)])
+def test_what_is_neither_a_home_nor_a_robot_is_refused(name, value):
+    with pytest.raises(EngineError, match=f"{name} = 3: "):
+        ig2mj.make("PointNavigation", **{name: value})
 
 
 def test_a_traced_action_is_refused_on_the_native_engine(env, action):

@@ -79,6 +79,8 @@ def find_robot(robot: str | TaskRobot) -> tuple[str, TaskRobot]:
       As `make_robot`.
     """
     if not isinstance(robot, str):
+        if not hasattr(robot, "attach"):
+            raise EngineError(f"robot = {robot!r}: a name, a folder, or a robot is expected")
         return robot.name, robot
     body = make_robot(robot)
     return (body.name if is_robot_folder(robot) else robot), body

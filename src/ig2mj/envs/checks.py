@@ -23,7 +23,7 @@ def checked_state(state: EnvState) -> EnvState:
     """The state. Raises ActionError: it is something else."""
     if not isinstance(state, EnvState):
         given = type(state).__name__
-        raise ActionError(f"a step takes the state that reset or the last step returned, and an action; not {given}")
+        raise ActionError(f"an environment takes the state that reset or the last step returned, not {given}")
     return state
 
 

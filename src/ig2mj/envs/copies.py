@@ -7,6 +7,7 @@ import os
 import typing
 from typing import Any
 
+from ig2mj.envs.checks import checked_state
 from ig2mj.envs.state import EnvState
 from ig2mj.envs.state_files import load_state, save_state
 from ig2mj.worlds.core import Core
@@ -18,8 +19,8 @@ class StateCopies:
     core: Core
 
     def check(self, state: EnvState) -> None:
-        """Raises StaleStateError: the state is stale. Nothing while tracing."""
-        self.core.check(state.batch)
+        """Raises StaleStateError: the state is stale, which is not known while tracing. ActionError: it is no state."""
+        self.core.check(checked_state(state).batch)
 
     def fork(self, state: EnvState) -> EnvState:
         """An independent copy of a state, for planners and branches: `state` stays valid, and both give the same

@@ -200,6 +200,8 @@ def requested_homes(task: AnyTask, config: EnvConfig, homes: Any) -> tuple[str, 
     split = Split.of(config.split)
     if homes is not None and config.home is not None:
         raise EngineError("home= and homes=: give one of them")
+    if config.home is not None and not isinstance(config.home, str | os.PathLike | Sequence):
+        raise EngineError(f"home = {config.home!r}: a home's name or folder, or a list of these")
     if config.home is not None and not isinstance(config.home, str | os.PathLike):
         for home in config.home:
             split.check_home(home)
