@@ -115,7 +115,7 @@ class RayTargets:
                     pos=piece_pos[k].astype(np.float32),
                     rotation=rotation[k].astype(np.float32),
                     size=piece_size[k].astype(np.float32),
-                    planes=_planes_in_body(piece_planes[k], piece_pos[k], rotation[k], step),
+                    planes=planes_in_body(piece_planes[k], piece_pos[k], rotation[k], step),
                 )
             )
         slots = _slots(pair[np.concatenate([*order, np.zeros(0, int)])], len(targets))
@@ -248,7 +248,7 @@ def _plane_steps(
     return np.where(kind == PieceKind.POLYHEDRON, rounded[np.searchsorted(rounded, count)], 0)
 
 
-def _planes_in_body(
+def planes_in_body(
     planes: Float[np.ndarray, "E N 4"],
     pos: Float[np.ndarray, "E 3"],
     rotation: Float[np.ndarray, "E 3 3"],

@@ -125,6 +125,15 @@ def idle(model: StateModel, states: ExtendedStates, view: PhysicsView, relations
 
 
 @entry_point
+def own_idle(model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations) -> Bool[Array, ""]:
+    """`idle` of ig2mj's own states, without those that were added."""
+    step, found = EventStep.start(model, states, view, relations), jnp.array(True)
+    for spec in EVENTS:
+        found &= False if spec.idle is None else spec.idle(step)
+    return found
+
+
+@entry_point
 def sources(model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations) -> Bool[Array, "W O S"]:
     """Which heat source acts on what, where nothing was cut in this step."""
     on = heat_source.switched_on(model, states.toggled_on, open.is_open(model, view.joint_pos))

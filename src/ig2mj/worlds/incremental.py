@@ -5,7 +5,7 @@ control step runs MuJoCo and `Rules.step` in full. Results are the same to the b
 (`tests/worlds/test_incremental_is_the_plain_path.py`).
 
 The core calls `IncrementalRules.of(rules, engine).step(states, view) -> Outcome` where it calls `rules.step` on other
-engines, with the states and the view of each control step. Five facts decide what runs:
+engines, with the states and the view of each control step. Six facts decide what runs:
 
 - All of a step is a pure function of the states and the view. Where both are those of the last step and the last step
   changed no state, its outcome is returned.
@@ -14,6 +14,9 @@ engines, with the states and the view of each control step. Five facts decide wh
 - Where something has moved, two small programs take the place of the first part: `states.update.idle` says whether it
   would change anything, `states.update.sources` which heat sources act. Each is called only where a field that it reads
   has changed. While sources act on the same objects, temperatures go on as before.
+- Where the last step changed nothing but temperatures, contents of containers and coats, and ig2mj's own states are
+  idle, one small program (`states.substances.flow_step`) takes the place of the first part. Streams end where they did
+  while nothing moves.
 - A goal is evaluated where something that it reads has changed (`ig2mj.worlds.incremental_goal`).
 - The native engine marks views between which nothing but agents moved (`engine.view.but_agents`). Such a view counts as
   the same, unless the states or the goal read what differs. Fingers count as the same while all are out of reach of all
@@ -45,12 +48,17 @@ from ig2mj.states.definitions import heat_source, toggled_on
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
-from ig2mj.states.update import can_be_idle, events, heat, heat_fields, idle, queries, sources
+from ig2mj.states.substances import flow_step
+from ig2mj.states.substances.volume import no_streams
+from ig2mj.states.update import can_be_idle, events, heat, heat_fields, idle, own_idle, queries, sources
 from ig2mj.states.world import ExtendedStates, Swap
 from ig2mj.worlds.incremental_goal import AHEAD, GoalPrograms, IncrementalGoal, TemperatureSteps
 from ig2mj.worlds.rules import Outcome, Rules
 
 FINGERS = "agent.finger_pos"
+
+FLOW_FIELDS = frozenset(flow_step.FIELDS)
+"""What a step of contents and coats changes."""
 
 SCENES = 8
 """Scenes whose programs are kept: those stepped last."""
@@ -81,6 +89,8 @@ class IncrementalRules:
         self._ahead_over = 0
         self._view: PhysicsView | None = None
         self._fingers_away: bool | None = None  # in `_view`; None: not looked at
+        self._flows = False  # the last step changed contents or coats, and else nothing but temperatures
+        self._streams: list[Array] | None = None  # those of the last step, while nothing has moved; None: not known
 
     @classmethod
     def of(cls, rules: Rules, engine: Engine) -> IncrementalRules:
@@ -94,7 +104,21 @@ class IncrementalRules:
             return self._whole_step(states, jax.tree.leaves(states), view)
         if view is not self._view and not self._is_same(view) and not self._is_idle(view):
             return self._whole_step(states, self._leaves, view)
+        flowed: frozenset[str] = frozenset()
+        if self._flows:
+            leaves, self._streams, complete, self._flows = self._programs.flow(self._leaves, view, self._streams)
+            if not complete:
+                return self._whole_step(states, self._leaves, view)
+            if self._flows:
+                self._leaves, flowed = leaves, FLOW_FIELDS
+                if self._settled:
+                    states = jax.tree.unflatten(self._programs.structure, leaves)
+                if not self._programs.heat_takes.isdisjoint(flowed):
+                    self._settled, self._ahead = False, None
         if self._settled:
+            if flowed:
+                self._last = Outcome(states, None, self._goal.after_change(view, self._leaves, flowed))
+                return self._last
             if self._goal.goes_on(view):
                 return last
             status = self._goal.evaluate(view, self._leaves)
@@ -111,14 +135,18 @@ class IncrementalRules:
             changed = [n for n, is_same in zip(self._programs.heat_names, same, strict=True) if not is_same]
             if not self._programs.late_reads.isdisjoint(changed):
                 self._acts = None  # the next step is a whole one
-            status = self._goal.after_heat(view, self._leaves, ahead, k, changed)
+            if flowed:
+                status = self._goal.after_change(view, self._leaves, flowed | set(changed))
+            else:
+                status = self._goal.after_heat(view, self._leaves, ahead, k, changed)
         self._last = Outcome(states, None, status)
         return self._last
 
     def _whole_step(self, states: ExtendedStates, leaves: list[Array], view: PhysicsView) -> Outcome:
         done = self._programs.step(leaves, view)
         self._view, self._fingers_away, self._ahead, self._leaves = view, None, None, done.leaves
-        self._acts, self._settled = done.acts if done.quiet else None, done.settled
+        self._flows, self._streams = done.flows, None
+        self._acts, self._settled = done.acts if done.quiet or done.flows else None, done.settled
         after = jax.tree.unflatten(self._programs.structure, done.leaves)
         self._last = Outcome(after, None, self._goal.evaluate(view, done.leaves))
         return self._last._replace(swap=done.swap)
@@ -136,13 +164,14 @@ class IncrementalRules:
 
     def _is_idle(self, view: PhysicsView) -> bool:
         """Whether nothing but temperatures changes in this step; notes which sources act in it."""
-        programs, before = self._programs, self._view
+        programs, before, own = self._programs, self._view, self._flows
         if not programs.tells_idle or before is None:
             return False
-        fingers, others = programs.idle_reads(self._leaves, view)
+        fingers, others = programs.idle_reads(self._leaves, view, own)
         same = _are_equal(view, before, others) and (not fingers or self._are_fingers_away(view))
-        if not same and not programs.idle(self._leaves, view):
+        if not same and not programs.idle(self._leaves, view, own):
             return False
+        self._streams = None
         acts = programs.acts(self._leaves, view)
         if acts is not self._acts and not np.array_equal(acts, np.asarray(self._acts)):
             self._settled, self._ahead = False, None
@@ -174,13 +203,15 @@ class _Step(NamedTuple):
 
     Attributes:
       leaves: of the states after it. swap: teleports that slicing asks for; None where there are none. acts: source on
-      object [W, O, S]. quiet: nothing but temperatures has changed. settled: nothing has.
+      object [W, O, S]. quiet: nothing but temperatures has changed. flows: contents or coats have, too, and nothing
+      else. settled: nothing has changed, but contents and coats where these flow.
     """
 
     leaves: list[Array]
     swap: Swap | None
     acts: Array
     quiet: bool
+    flows: bool
     settled: bool
 
 
@@ -205,10 +236,15 @@ class _StatePrograms:
         self.tells_idle = can_be_idle(model) and not added.heat_reads_view and not self.fingers_matter
         self._step, self._heat = HostFunction(self._rules_fn), HostFunction(self._heat_fn)
         self._idle, self._acts = HostFunction(self._idle_fn), HostFunction(self._acts_fn)
+        self._own_idle, self._flow = HostFunction(self._own_idle_fn), HostFunction(self._flow_fn)
+        self._flow_places = [place for place, name in enumerate(names) if name in FLOW_FIELDS]
+        self._names, self._can_flow = names, flow_step.possible(model)
+        self._no_streams: list[Array] = jax.tree.leaves(no_streams(model, num_worlds)) if self._can_flow else []
+        self._with_streams = jax.tree.structure((0, [0] * len(names), [0] * len(self._no_streams), 0))
         self._none_act = np.zeros((num_worlds, model.tables.num_objects, len(model.parameters.heat_object)), bool)
         self._of_view_and_states = jax.tree.structure((0, [0] * len(names)))
         self._with_acts = jax.tree.structure((0, [0] * len(names), 0))
-        self._idle_reads: tuple[bool, list[str]] | None = None  # known once it was traced
+        self._idle_reads: dict[bool, tuple[bool, list[str]]] = {}  # known once they were traced
         self._changed: list[int] = []  # leaves of the states that a step can change; known once it was traced
 
     @staticmethod
@@ -228,19 +264,41 @@ class _StatePrograms:
         leaves = list(leaves)
         for place, leaf in zip(self._changed, made, strict=True):
             leaves[place] = leaf
-        quiet, settled, swapped = flags.tolist()
-        return _Step(leaves, Swap(*swap) if swapped else None, acts, quiet, settled)
+        quiet, flows, settled, swapped = flags.tolist()
+        flows = flows and not quiet and self._can_flow
+        return _Step(leaves, Swap(*swap) if swapped else None, acts, quiet, flows, settled and (quiet or flows))
 
-    def idle_reads(self, leaves: list[Array], view: PhysicsView) -> tuple[bool, list[str]]:
+    def idle_reads(self, leaves: list[Array], view: PhysicsView, own: bool) -> tuple[bool, list[str]]:
         """Whether the answer of `idle` depends on fingers, and on which other fields of the view."""
-        if self._idle_reads is None:
-            reads = self._idle.traced([view, *leaves], self._of_view_and_states)
-            self._idle_reads = FINGERS in reads, sorted(reads - {FINGERS})
-        return self._idle_reads
+        if own not in self._idle_reads:
+            function = self._own_idle if own else self._idle
+            reads = function.traced([view, *leaves], self._of_view_and_states)
+            self._idle_reads[own] = FINGERS in reads, sorted(reads - {FINGERS})
+        return self._idle_reads[own]
 
-    def idle(self, leaves: list[Array], view: PhysicsView) -> bool:
-        """Whether the first part of `update` changes nothing."""
-        return bool(self._idle.flat([view, *leaves], self._of_view_and_states))
+    def idle(self, leaves: list[Array], view: PhysicsView, own: bool) -> bool:
+        """Whether the first part of `update` changes nothing. `own`: of ig2mj's own states."""
+        function = self._own_idle if own else self._idle
+        return bool(function.flat([view, *leaves], self._of_view_and_states))
+
+    def flow(
+        self, leaves: list[Array], view: PhysicsView, streams: list[Array] | None
+    ) -> tuple[list[Array], list[Array], bool, bool]:
+        """A step of contents and coats: leaves after it, its streams, whether it is complete, and whether it changes
+        something. `streams`: of the last step, where nothing has moved since."""
+        given = self._no_streams if streams is None else streams
+        made, streams, complete, changes = self._flow.flat(
+            [view, *leaves, *given, np.array(streams is not None)], self._with_streams
+        )
+        leaves = list(leaves)
+        for place, leaf in zip(self._flow_places, made, strict=True):
+            leaves[place] = leaf
+        return leaves, streams, bool(complete), bool(changes)
+
+    @functools.cached_property
+    def heat_takes(self) -> frozenset[str]:
+        """Fields of states on which temperatures depend; known after the first call of `heat`."""
+        return frozenset(self._names[i - 1] for i in self._heat.takes if 1 <= i <= len(self._names))
 
     def acts(self, leaves: list[Array], view: PhysicsView) -> Bool[np.ndarray, "W O S"]:
         """Which source acts on what."""
@@ -258,13 +316,27 @@ class _StatePrograms:
         after, swap, acts = events(self.model, states, view, self._plan.evaluate(view))
         new = heat(self.model, after, acts, view)
         quiet, same = _are_same(states, after), _are_same(after, new)
+        flows = _are_same(states, after, FLOW_FIELDS) & ~jnp.any(swap.mask)
         made = jax.tree.leaves(new)
         self._changed = [i for i, leaf in enumerate(made) if leaf is not before[i]]
-        flags = jnp.stack([quiet, quiet & same, jnp.any(swap.mask)])
+        flags = jnp.stack([quiet, flows, same, jnp.any(swap.mask)])
         return [made[i] for i in self._changed], (swap.mask, swap.pos, swap.quat), acts, flags
 
     def _idle_fn(self, view: PhysicsView, leaves: list[Array]) -> Array:
         return idle(self.model, jax.tree.unflatten(self.structure, leaves), view, self._plan.evaluate(view))
+
+    def _own_idle_fn(self, view: PhysicsView, leaves: list[Array]) -> Array:
+        return own_idle(self.model, jax.tree.unflatten(self.structure, leaves), view, self._plan.evaluate(view))
+
+    def _flow_fn(
+        self, view: PhysicsView, leaves: list[Array], streams: list[Array], same: Array
+    ) -> tuple[list[Array], list[Array], Array, Array]:
+        before = jax.tree.unflatten(jax.tree.structure(no_streams(self.model, 1)), streams)
+        states = jax.tree.unflatten(self.structure, leaves)
+        done = flow_step.flowed(self.model, states, view, self._plan.evaluate(view), before, same)
+        made = [jax.tree.leaves(done.states)[place] for place in self._flow_places]
+        changes = jnp.any(jnp.stack([jnp.any(a != leaves[p]) for a, p in zip(made, self._flow_places, strict=True)]))
+        return made, jax.tree.leaves(done.streams), done.complete, changes
 
     def _acts_fn(self, view: PhysicsView, leaves: list[Array]) -> Array:
         return sources(self.model, jax.tree.unflatten(self.structure, leaves), view, self._plan.evaluate(view))
@@ -284,10 +356,12 @@ class _StatePrograms:
         return [jnp.moveaxis(steps, 0, 1) for steps in made], same
 
 
-def _are_same(one: ExtendedStates, other: ExtendedStates) -> Bool[Array, ""]:
-    """Whether all numbers of two states are equal; arrays that are one object are not compared."""
-    leaves = zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True)
-    return jnp.all(jnp.array([True, *(jnp.all(a == b) for a, b in leaves if a is not b)]))
+def _are_same(one: ExtendedStates, other: ExtendedStates, but: Iterable[str] = ()) -> Bool[Array, ""]:
+    """Whether all numbers of two states are equal, `but` those of some fields; arrays that are one object are not
+    compared."""
+    leaves = zip(jax.tree_util.tree_leaves_with_path(one), jax.tree.leaves(other), strict=True)
+    compared = [(a, b) for (path, a), b in leaves if a is not b and path[0].name not in but]
+    return jnp.all(jnp.array([True, *(jnp.all(a == b) for a, b in compared)]))
 
 
 def _is_of_agents(field: str) -> bool:

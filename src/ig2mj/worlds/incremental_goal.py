@@ -10,7 +10,7 @@ Axes: W worlds, O objects, N = `AHEAD` steps.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from typing import NamedTuple
 
 import jax
@@ -100,6 +100,12 @@ class IncrementalGoal:
             self._status = self._of_ahead(k)
         return self._status
 
+    def after_change(self, view: PhysicsView, leaves: list[Array], changed: Set[str]) -> GoalStatus:
+        """The status after a step that changed these fields of the states."""
+        if not self.goes_on(view) or not self._programs.state_reads.isdisjoint(changed):
+            return self.evaluate(view, leaves)
+        return self._status
+
 
 class GoalPrograms:
     """A goal's status, compiled.
@@ -117,6 +123,7 @@ class GoalPrograms:
         if goal is not None:
             named, self._structure = jax.tree_util.tree_flatten_with_path(initial_states(goal.model, num_worlds))
             names, late = [path[0].name for path, _ in named], heat_fields(goal.model)
+            self._names = names
             self._heat_places = [place for place, name in enumerate(names) if name in late]
             self._heat_names = [names[place] for place in self._heat_places]
             self._arguments = jax.tree.structure((0, [0] * len(names), [0] * len(self._heat_places), 0))
@@ -173,16 +180,19 @@ class GoalPrograms:
             reads = (self._questions.reads(find(name)) for name in self._goal.literals.instances)
             return frozenset(name for names in reads for name in names)
         first = 1 + self._structure.num_leaves  # the view, the states, then temperatures
-        heat_reads = {f"states.{name}" for i, name in enumerate(self._heat_names) if first + i in self._statuses.takes}
-        return frozenset({*heat_reads, *(f"view.{name}" for name in self._statuses.reads)})
+        heat_reads = {name for i, name in enumerate(self._heat_names) if first + i in self._statuses.takes}
+        reads = heat_reads | {name for i, name in enumerate(self._names) if 1 + i in self._statuses.takes}
+        return frozenset({*(f"states.{name}" for name in reads), *(f"view.{name}" for name in self._statuses.reads)})
+
+    @functools.cached_property
+    def state_reads(self) -> frozenset[str]:
+        """Fields of states on which it depends; known after the first call."""
+        return frozenset(name.split(".")[1] for name in self._reads if name.startswith("states."))
 
     @functools.cached_property
     def heat_reads(self) -> frozenset[str]:
         """Fields that `heat` changes on which it depends; known after the first call."""
-        if self._goal is None:
-            return frozenset()
-        read = {name.split(".")[1] for name in self._reads if name.startswith("states.")}
-        return frozenset(self._heat_names).intersection(read)
+        return frozenset() if self._goal is None else frozenset(self._heat_names) & self.state_reads
 
     @functools.cached_property
     def _view_reads(self) -> list[str]:

@@ -97,7 +97,8 @@ def spilled(
     found, p = of(model), model.parameters
     soakable = np.isfinite(p.wetness_soaked)
     soaking = jnp.where(by_taps[..., None], 0.0, amounts) / DROP
-    drops = jnp.sum(jnp.where((landed.object & soakable)[..., None], soaking[:, :, None], 0.0), axis=1)  # [W, O, U]
+    met = landed.object[..., None] == np.arange(len(soakable))  # [W, K, O]
+    drops = jnp.sum(jnp.where((met & soakable)[..., None], soaking[:, :, None], 0.0), axis=1)  # [W, O, U]
     water = drops[..., found.water] if found.water >= 0 else jnp.zeros(drops.shape[:2])
     if model.paper:
         wet = states.wetness + water
@@ -105,8 +106,8 @@ def spilled(
         wet = jnp.where(
             water > 0, jnp.maximum(states.wetness, np.where(soakable, p.wetness_soaked, 0.0)), states.wetness
         )
-    drains = p.has("waterSink")
-    onto = jnp.any(amounts > 0, axis=-1)[..., None] & landed.object & ~drains & ~soakable  # [W, K, O]
+    takes = np.append(~p.has("waterSink") & ~soakable, False)  # the last: no object
+    onto = jnp.any(amounts > 0, axis=-1) & jnp.asarray(takes)[landed.object]  # [W, K]
     coat = jax.lax.cond(
         jnp.any(onto),
         lambda: _covered_by(model, states.coat, amounts, landed, onto, view),
@@ -122,17 +123,28 @@ def _covered_by(
     coat: UInt32[Array, "W D U"],
     amounts: Float[Array, "W K U"],
     landed: Landed,
-    onto: Bool[Array, "W K O"],
+    onto: Bool[Array, "W K"],
     view: PhysicsView,
 ) -> UInt32[Array, "W D U"]:
-    pos = positions(model, view)
+    found = of(model)
+    if not len(found.covered):
+        return jnp.asarray(coat)
+    row = jnp.where(onto, jnp.asarray(found.row)[landed.object], len(found.covered))  # [W, K]
+    read = jnp.minimum(row, len(found.covered) - 1)
+    body, at = jnp.asarray(found.body)[read], jnp.asarray(found.pos)[read]  # [W, K, N(, 3)]
+    flat = body.reshape(len(body), -1, 1)
+    pos, quat = (
+        jnp.take_along_axis(jnp.asarray(field), flat, axis=1).reshape(*body.shape, -1)
+        for field in (view.body_pos, view.body_quat)
+    )
+    offset = pos + quat_rotate(quat, at) - landed.pos[:, :, None]
+    distance = jnp.sum(offset * offset, axis=-1)
+    near = (distance <= NEAR**2) | (distance <= jnp.min(distance, axis=-1, keepdims=True))
+    bits = as_bits(near)
     new = jnp.asarray(coat)
     for k in range(amounts.shape[1]):
-        offset = pos - landed.pos[:, k, None, None]
-        distance = jnp.sum(offset * offset, axis=-1)
-        near = (distance <= NEAR**2) | (distance <= jnp.min(distance, axis=-1, keepdims=True))
-        bits = jnp.where(onto[:, k, of(model).covered], as_bits(near), np.uint32(0))
-        new = new | jnp.where((amounts[:, k] > 0)[:, None], bits[..., None], np.uint32(0))
+        mine = (row[:, k, None] == np.arange(len(found.covered)))[..., None] & (amounts[:, k] > 0)[:, None]
+        new = new | jnp.where(mine, bits[:, k, None, None], np.uint32(0))
     return new
 
 
@@ -157,9 +169,13 @@ def wipe(step: EventStep) -> EventStep:
     model = step.model
     if not len(model.parameters.tool_object) or not len(of(model).covered) or not len(of(model).names):
         return step
-    meeting = _meeting(step)
-    states = jax.lax.cond(jnp.any(meeting), lambda: _wiped(step, meeting), lambda: _fields(step.states))
-    return step.having(**states)
+
+    def act() -> dict[str, Array]:
+        meeting = _meeting(step)
+        return jax.lax.cond(jnp.any(meeting), lambda: _wiped(step, meeting), lambda: _fields(step.states))
+
+    some = jnp.any(jnp.asarray(step.states.coat) > 0)
+    return step.having(**jax.lax.cond(some, act, lambda: _fields(step.states)))
 
 
 def _fields(states: ExtendedStates) -> dict[str, Array]:
@@ -192,7 +208,8 @@ def wipes_nothing(step: EventStep) -> Bool[Array, ""]:
     """No tool meets what it can remove."""
     if not len(step.model.parameters.tool_object) or not len(of(step.model).covered):
         return jnp.array(True)
-    return ~jnp.any(_meeting(step))
+    some = jnp.any(jnp.asarray(step.states.coat) > 0)
+    return ~jax.lax.cond(some, lambda: jnp.any(_meeting(step)), lambda: jnp.array(False))
 
 
 def set_covered(model: StateModel, states: ExtendedStates, obj: int, name: str, value: bool) -> ExtendedStates:

@@ -1,7 +1,7 @@
 """Where what flows out of containers and taps falls: into an opening, onto an object, or nowhere.
 
 A stream leaves a rim outwards and falls. Its way is a parabola in three pieces, each a straight fall at the middle of
-its piece (`ig2mj.geometry.targets.fall_contact`). The first opening that faces upwards or the first object decides. The
+its piece (`ig2mj.geometry.first_fall`). The first opening that faces upwards or the first object decides. The
 object that it comes from is not in its way.
 
 Axes: W worlds, K streams, S = 3 pieces of the way, C containers, O objects, R corners of a rim, B bodies.
@@ -9,6 +9,7 @@ Axes: W worlds, K streams, S = 3 pieces of the way, C containers, O objects, R c
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -17,8 +18,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.first_fall import FallPieces, Ways, first_met
 from ig2mj.geometry.poses import quat_rotate_inverse
-from ig2mj.geometry.targets import RayTargets, fall_contact
 from ig2mj.scene.tables import SceneTables
 from ig2mj.states.relations.worklist import Worklist
 from ig2mj.states.substances.containers import Containers, Openings
@@ -47,8 +48,9 @@ UPWARDS = 0.3
 SLACK = 0.005
 """m by which an opening may lie below an object's surface and still be met first: the edge of its own rim."""
 
-WORLDS_AT_ONCE = 256
-"""Worlds whose streams are followed together: of a larger batch only those in which something flows."""
+WORLDS_AT_ONCE = (256, 4096)
+"""Worlds whose streams are followed together, of those in which something flows: the first number while there are no
+more, else the second."""
 
 
 class Falling(NamedTuple):
@@ -56,44 +58,59 @@ class Falling(NamedTuple):
 
     Attributes:
       active: there is a stream. start: m, world. aside: unit vector outwards, or 0 for a tap. source: container that it
-        comes from. origin: object that it comes from.
+        comes from. origin: object that it comes from, -1: none.
     """
 
     active: Bool[Array, "W K"]
     start: Float[Array, "W K 3"]
     aside: Float[Array, "W K 2"]
     source: Bool[Array, "W K C"]
-    origin: Bool[Array, "W K O"]
+    origin: Int[Array, "W K"]
     openings: Openings
     body_pos: Float[Array, "W B 3"]
     body_quat: Float[Array, "W B 4"]
 
 
 class Landed(NamedTuple):
-    """Where streams end: in a container, or on an object at a place (m, world); neither: nowhere."""
+    """Where streams end: in a container, or on an object (-1: on none) at a place (m, world); neither: nowhere."""
 
     container: Bool[Array, "W K C"]
-    object: Bool[Array, "W K O"]
+    object: Int[Array, "W K"]
     pos: Float[Array, "W K 3"]
 
 
 def land(tables: SceneTables, containers: Containers, falling: Falling) -> Landed:
     """Follows the streams of all worlds."""
     num_worlds = falling.active.shape[0]
-    nowhere = Landed(jnp.zeros(falling.source.shape, bool), jnp.zeros(falling.origin.shape, bool), falling.start)
+    nothing = jnp.full(falling.active.shape, -1, jnp.int32)
+    nowhere = Landed(jnp.zeros(falling.source.shape, bool), nothing, falling.start)
     flowing = jnp.any(falling.active, axis=1)
-    if num_worlds <= WORLDS_AT_ONCE:
+    if num_worlds <= WORLDS_AT_ONCE[0]:
         return jax.lax.cond(jnp.any(flowing), lambda: _followed(tables, containers, falling), lambda: nowhere)
-    listed = Worklist.of(flowing, WORLDS_AT_ONCE)
+    few, many = (_in_turns(tables, containers, falling, nowhere, min(n, num_worlds)) for n in WORLDS_AT_ONCE)
+    return jax.lax.cond(jnp.sum(flowing) <= WORLDS_AT_ONCE[0], few, many)
 
-    def some(turn: Int[jax.Array, ""], done: Landed) -> Landed:
-        worlds = listed.places(turn * WORLDS_AT_ONCE)  # beyond the last: `num_worlds`, which reads any and writes none
-        own = jax.tree.map(lambda a: jnp.asarray(a)[jnp.minimum(worlds, num_worlds - 1)], falling)
-        found = _followed(tables, containers, own)
-        return jax.tree.map(lambda a, b: a.at[worlds].set(b, mode="drop"), done, found)
 
-    turns = (jnp.sum(flowing) + WORLDS_AT_ONCE - 1) // WORLDS_AT_ONCE
-    return jax.lax.fori_loop(0, turns, some, jax.tree.map(jnp.asarray, nowhere))
+def _in_turns(
+    tables: SceneTables, containers: Containers, falling: Falling, nowhere: Landed, at_once: int
+) -> Callable[[], Landed]:
+    """Follows streams of so many worlds at a time."""
+    flowing = jnp.any(falling.active, axis=1)
+    num_worlds = len(flowing)
+
+    def act() -> Landed:
+        listed = Worklist.of(flowing, at_once)
+
+        def some(turn: Int[jax.Array, ""], done: Landed) -> Landed:
+            worlds = listed.places(turn * at_once)  # beyond the last: `num_worlds`, which reads any and writes none
+            own = jax.tree.map(lambda a: jnp.asarray(a)[jnp.minimum(worlds, num_worlds - 1)], falling)
+            found = _followed(tables, containers, own)
+            return jax.tree.map(lambda a, b: a.at[worlds].set(b, mode="drop"), done, found)
+
+        turns = (jnp.sum(flowing) + at_once - 1) // at_once
+        return jax.lax.fori_loop(0, turns, some, jax.tree.map(jnp.asarray, nowhere))
+
+    return act
 
 
 def falling_from(
@@ -101,7 +118,7 @@ def falling_from(
     start: Float[Array, "W K 3"],
     aside: Float[Array, "W K 2"],
     source: Bool[Array, "W K C"],
-    origin: Bool[Array, "W K O"],
+    origin: Int[Array, "W K"],
     openings: Openings,
     view: PhysicsView,
 ) -> Falling:
@@ -112,7 +129,6 @@ def falling_from(
 
 
 def _followed(tables: SceneTables, containers: Containers, falling: Falling) -> Landed:
-    num_worlds = falling.active.shape[0]
     depths = np.array([GRAVITY / 2 * t * t for t in TIMES] + [FALL], np.float32)
     middles = np.array([0.5 * (a + b) for a, b in zip(TIMES, (*TIMES[1:], TIMES[-1]), strict=True)], np.float32)
     out = (LIP + SPEED * middles)[:, None] * falling.aside[:, :, None, :]
@@ -120,28 +136,19 @@ def _followed(tables: SceneTables, containers: Containers, falling: Falling) -> 
         [falling.start[:, :, None, :2] + out, falling.start[:, :, None, 2:] - depths[:-1, None]], axis=-1
     )  # [W, K, S, 3]
     lengths = jnp.broadcast_to(jnp.asarray(np.diff(depths)), pos.shape[:-1])
-    objects = np.arange(tables.num_objects)
-    reach = fall_contact(
-        RayTargets.build(tables, objects),
-        falling.body_pos,
-        falling.body_quat,
-        pos.reshape(num_worlds, -1, 3),
-        lengths.reshape(num_worlds, -1),
-    ).reshape(*pos.shape[:3], -1)
-    reach = jnp.where(falling.origin[:, :, None], jnp.inf, reach + depths[:-1, None])
-    solid = jnp.min(reach, axis=2)  # [W, K, O]
+    ways = Ways(falling.active, pos, lengths, depths[:-1], falling.origin)
+    solid = first_met(FallPieces.of(tables), falling.body_pos, falling.body_quat, ways)
     opening = _openings_met(containers, falling, pos, lengths, depths)  # [W, K, C]
-    first_object, first_opening = jnp.min(solid, axis=-1), jnp.min(opening, axis=-1, initial=jnp.inf)
-    enters = falling.active & jnp.isfinite(first_opening) & (first_opening <= first_object + SLACK)
-    meets = falling.active & ~enters & jnp.isfinite(first_object)
+    first_opening = jnp.min(opening, axis=-1, initial=jnp.inf)
+    enters = falling.active & jnp.isfinite(first_opening) & (first_opening <= solid.depth + SLACK)
+    meets = falling.active & ~enters & (solid.object >= 0)
     own = np.arange(opening.shape[-1])
     into = enters[..., None] & (jnp.argmin(opening, axis=-1)[..., None] == own) if len(own) else falling.source
-    onto = meets[..., None] & (jnp.argmin(solid, axis=-1)[..., None] == objects)
-    depth = jnp.where(meets, first_object, 0.0)
+    depth = jnp.where(meets, solid.depth, 0.0)
     piece = jnp.sum(depth[..., None] >= depths[1:-1], axis=-1)[..., None] == np.arange(len(TIMES))
     aside = jnp.sum(jnp.where(piece[..., None], pos[..., :2], 0.0), axis=2)
     place = jnp.concatenate([aside, falling.start[..., 2:] - depth[..., None]], axis=-1)
-    return Landed(into, onto, place)
+    return Landed(into, jnp.where(meets, solid.object, -1), place)
 
 
 def _openings_met(

@@ -11,8 +11,9 @@ points, O objects.
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
@@ -22,7 +23,7 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep, Saved, StateSpec, nothing_inherited
 from ig2mj.states.substances import coat
 from ig2mj.states.substances.model import of
-from ig2mj.states.substances.streams import MOST, falling_from, land
+from ig2mj.states.substances.streams import MOST, Landed, falling_from, land
 
 if TYPE_CHECKING:
     from ig2mj.states.world import ExtendedStates
@@ -101,13 +102,32 @@ def drained(model: StateModel, volume: Float[Array, "W C U"]) -> Float[Array, "W
     return jnp.minimum(volume / jnp.maximum(total, 1e-12)[..., None] * leaving[..., None], volume)
 
 
+class Streams(NamedTuple):
+    """Which outlets had streams in a step, and where these ended."""
+
+    chosen: Bool[Array, "W K E"]
+    landed: Landed
+
+
 def update(step: EventStep) -> EventStep:
     """One control step of all volumes."""
+    return flow(step)[0]
+
+
+def flow(
+    step: EventStep, before: Streams | None = None, same: Bool[Array, ""] | bool = False
+) -> tuple[EventStep, Streams | None]:
+    """One control step of all volumes, and its streams; None where the scene has no outlets.
+
+    Args:
+      before: those of another step. same: nothing has moved since that step, so that the streams of the same outlets
+        end where they did.
+    """
     model, states, view = step.model, step.states, step.view
     found = of(model)
     containers = found.containers
-    if not len(containers.body) and not len(model.parameters.water_object):
-        return step
+    if not has_outlets(model):
+        return step, None
     gone = drained(model, states.volume)
     volume = states.volume - gone
     left, given = outflow(model, volume, states.stock, states.solid, view)
@@ -121,17 +141,7 @@ def update(step: EventStep) -> EventStep:
     left, given, from_taps = (jnp.where(flows[:, a:b], x, 0.0) for a, b, x in
                               ((0, count, left), (0, count, given), (count, None, from_taps)))  # fmt: skip
     amounts = jnp.sum(jnp.where(chosen[..., None], amounts[:, None], 0.0), axis=2)  # [W, K, U]
-    start, aside = _beginnings(model, view)
-    falling = falling_from(
-        jnp.any(chosen, axis=-1),
-        jnp.sum(jnp.where(chosen[..., None], start[:, None], 0.0), axis=2),
-        jnp.sum(jnp.where(chosen[..., None], aside[:, None], 0.0), axis=2),
-        chosen[:, :, :count],
-        _origins(model, chosen),
-        containers.openings(view),
-        view,
-    )
-    landed = land(model.tables, containers, falling)
+    landed = _landed(model, chosen, view, before, same)
     into = jnp.sum(jnp.where(landed.container[..., None], amounts[:, :, None], 0.0), axis=1)
     outside = jnp.where(jnp.any(landed.container, axis=-1)[..., None], 0.0, amounts)
     states = dataclasses.replace(
@@ -141,7 +151,55 @@ def update(step: EventStep) -> EventStep:
         drawn=states.drawn + jnp.sum(given, axis=1) + jnp.sum(from_taps, axis=1),
     )
     by_taps = jnp.any(chosen[:, :, count:], axis=-1)  # their drops soak (`ig2mj.states.definitions.water`)
-    return dataclasses.replace(step, states=coat.spilled(model, states, outside, landed, by_taps, view))
+    step = dataclasses.replace(step, states=coat.spilled(model, states, outside, landed, by_taps, view))
+    return step, Streams(chosen, landed)
+
+
+def has_outlets(model: StateModel) -> bool:
+    """Whether something can flow in a scene."""
+    return bool(len(of(model).containers.body) or len(model.parameters.water_object))
+
+
+def no_streams(model: StateModel, worlds: int) -> Streams:
+    """Streams of a step in which nothing flows. NumPy arrays."""
+    containers, outlets = len(of(model).containers.body), len(of(model).containers.body) + len(_tap_links(model))
+    return Streams(
+        np.zeros((worlds, MOST, outlets), bool),
+        Landed(
+            np.zeros((worlds, MOST, containers), bool),
+            np.full((worlds, MOST), -1, np.int32),
+            np.zeros((worlds, MOST, 3), np.float32),
+        ),
+    )
+
+
+def _landed(
+    model: StateModel,
+    chosen: Bool[Array, "W K E"],
+    view: PhysicsView,
+    before: Streams | None,
+    same: Bool[Array, ""] | bool,
+) -> Landed:
+    """Where the streams of the chosen outlets end."""
+    containers = of(model).containers
+
+    def follow() -> Landed:
+        start, aside = _beginnings(model, view)
+        falling = falling_from(
+            jnp.any(chosen, axis=-1),
+            jnp.sum(jnp.where(chosen[..., None], start[:, None], 0.0), axis=2),
+            jnp.sum(jnp.where(chosen[..., None], aside[:, None], 0.0), axis=2),
+            chosen[:, :, : len(containers.body)],
+            _origins(model, chosen),
+            containers.openings(view),
+            view,
+        )
+        return land(model.tables, containers, falling)
+
+    if before is None:
+        return follow()
+    known = same & jnp.all(before.chosen == chosen)
+    return jax.lax.cond(known, lambda: jax.tree.map(jnp.asarray, before.landed), follow)
 
 
 def _beginnings(model: StateModel, view: PhysicsView) -> tuple[Float[Array, "W E 3"], Float[Array, "W E 2"]]:
@@ -156,11 +214,10 @@ def _tap_links(model: StateModel) -> np.ndarray:
     return model.parameters.water_link if of(model).water >= 0 else np.zeros(0, int)
 
 
-def _origins(model: StateModel, chosen: Bool[Array, "W K E"]) -> Bool[Array, "W K O"]:
-    """The object that each stream comes from; of a tap none, since its own basin takes it."""
-    objects = np.arange(model.tables.num_objects)
+def _origins(model: StateModel, chosen: Bool[Array, "W K E"]) -> Int[Array, "W K"]:
+    """The object that each stream comes from; -1 of a tap, since its own basin takes it."""
     owner = np.concatenate([of(model).containers.object, np.full(len(_tap_links(model)), -1)])
-    return jnp.any(chosen[..., None] & (owner[:, None] == objects), axis=2)
+    return jnp.max(jnp.where(chosen, owner, -1), axis=2, initial=-1)
 
 
 def idle(step: EventStep) -> Bool[Array, ""]:

@@ -32,12 +32,16 @@ def _machines(model: StateModel, categories: Sequence[str]) -> Int[np.ndarray, "
     return np.flatnonzero([category in categories for category in model.tables.object_categories])
 
 
-def _inside(step: EventStep, machines: Int[np.ndarray, "M"]) -> Bool[Array, "W M O"]:
+def _running(step: EventStep, machines: Int[np.ndarray, "M"]) -> Bool[Array, "W M"]:
+    """Which machines run."""
+    has_switch = step.model.parameters.has("toggleable")[machines]
+    on = jnp.where(has_switch, jnp.asarray(step.states.toggled_on)[:, machines], True)
+    return on & ~open.is_open(step.model, step.view.joint_pos)[:, machines]
+
+
+def _inside(step: EventStep, machines: Int[np.ndarray, "M"], runs: Bool[Array, "W M"]) -> Bool[Array, "W M O"]:
     """Which loose objects are in which machine that runs: their centre is in its box."""
     model, view = step.model, step.view
-    has_switch = model.parameters.has("toggleable")[machines]
-    on = jnp.where(has_switch, jnp.asarray(step.states.toggled_on)[:, machines], True)
-    runs = on & ~open.is_open(model, view.joint_pos)[:, machines]
     com = jnp.asarray(view.object_com)[:, None]
     low, high = jnp.asarray(view.aabb_low)[:, machines, None], jnp.asarray(view.aabb_high)[:, machines, None]
     loose = ~model.tables.object_fixed & (np.arange(model.tables.num_objects) != machines[:, None])
@@ -89,13 +93,26 @@ def update(step: EventStep) -> EventStep:
     for categories, act in KINDS:
         machines = _machines(step.model, categories)
         if len(machines):
-            step = _after(step, _inside(step, machines), act)
+            step = _after(step, machines, act)
     return step
 
 
-def _after(step: EventStep, inside: Bool[Array, "W M O"], act: Any) -> EventStep:
-    kept = jax.tree.map(jnp.asarray, {name: getattr(step.states, name) for name in act(step, inside)})
-    return step.having(**jax.lax.cond(jnp.any(inside), lambda: act(step, inside), lambda: kept))
+def _after(step: EventStep, machines: Int[np.ndarray, "M"], act: Any) -> EventStep:
+    runs = _running(step, machines)
+    names = act(step, jnp.zeros((*runs.shape, step.model.tables.num_objects), bool))
+    kept = jax.tree.map(jnp.asarray, {name: getattr(step.states, name) for name in names})
+    done = jax.lax.cond(jnp.any(runs), lambda: act(step, _inside(step, machines, runs)), lambda: kept)
+    return step.having(**done)
+
+
+def rests(step: EventStep) -> Bool[Array, ""]:
+    """No machine runs."""
+    found = jnp.array(True)
+    for categories, _ in KINDS:
+        machines = _machines(step.model, categories)
+        if len(machines):
+            found &= ~jnp.any(_running(step, machines))
+    return found
 
 
 def idle(step: EventStep) -> Bool[Array, ""]:
@@ -103,12 +120,21 @@ def idle(step: EventStep) -> Bool[Array, ""]:
     found = jnp.array(True)
     for categories, act in KINDS:
         machines = _machines(step.model, categories)
-        if not len(machines):
-            continue
-        inside = _inside(step, machines)
-        pairs = [
-            (jax.tree.leaves(new), jax.tree.leaves(getattr(step.states, n))) for n, new in act(step, inside).items()
-        ]
-        same = [jnp.all(a == jnp.asarray(b)) for new, old in pairs for a, b in zip(new, old, strict=True)]
-        found &= ~jnp.any(inside) | jnp.all(jnp.stack(same))
+        if len(machines):
+            runs = _running(step, machines)
+            found &= ~_any_changes(step, machines, runs, act)
     return found
+
+
+def _any_changes(
+    step: EventStep, machines: Int[np.ndarray, "M"], runs: Bool[Array, "W M"], act: Any
+) -> Bool[Array, ""]:
+    return jax.lax.cond(jnp.any(runs), lambda: _changes(step, machines, runs, act), lambda: jnp.array(False))
+
+
+def _changes(step: EventStep, machines: Int[np.ndarray, "M"], runs: Bool[Array, "W M"], act: Any) -> Bool[Array, ""]:
+    """Whether machines that run change some state."""
+    made = act(step, _inside(step, machines, runs))
+    pairs = [(jax.tree.leaves(new), jax.tree.leaves(getattr(step.states, n))) for n, new in made.items()]
+    differ = [jnp.any(a != jnp.asarray(b)) for news, olds in pairs for a, b in zip(news, olds, strict=True)]
+    return jnp.any(jnp.stack(differ))

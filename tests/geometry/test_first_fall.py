@@ -1,0 +1,53 @@
+"""`first_met` finds what `fall_contact` finds: the least depth of all objects, and the object."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+import pytest
+from hand_world import HandWorld, Item
+
+from ig2mj.geometry import first_fall
+from ig2mj.geometry.first_fall import FallPieces, Ways, first_met
+from ig2mj.geometry.targets import RayTargets, fall_contact
+
+RNG = np.random.default_rng(0)
+LINES, DEPTHS = 40, np.array([0.0, 0.4], np.float32)
+
+
+def _world(count: int) -> HandWorld:
+    """A floor and boxes in disorder over it."""
+    items = [Item("floor", (((0, 0, -0.1), (3, 3, 0.1)),), fixed=True)]
+    for n in range(count):
+        quat = RNG.normal(size=4)
+        boxes = tuple((tuple(RNG.uniform(-0.2, 0.2, 3)), tuple(RNG.uniform(0.05, 0.3, 3))) for _ in range(3))
+        items.append(
+            Item(
+                f"box{n}", boxes, pos=tuple(RNG.uniform(-1, 1, 3) + (0, 0, 1)), quat=tuple(quat / np.linalg.norm(quat))
+            )
+        )
+    return HandWorld(*items)
+
+
+@pytest.mark.parametrize("at_once", [(3, 2), (16, 4)], ids=["in turns", "at once"])
+def test_the_first_object_is_the_one_of_least_depth(at_once, monkeypatch):
+    monkeypatch.setattr(first_fall, "AT_ONCE", {"cpu": at_once, "gpu": at_once})
+    world = _world(12)
+    view, tables = world.view(), world.tables
+    start = RNG.uniform(-1.2, 1.2, (1, LINES, 2, 3)).astype(np.float32) + np.array([0, 0, 1.5], np.float32)
+    length = RNG.uniform(0.2, 2.5, (1, LINES, 2)).astype(np.float32)
+    ignored = RNG.integers(-1, tables.num_objects, (1, LINES)).astype(np.int32)
+    active = RNG.random((1, LINES)) < 0.8
+    every = fall_contact(
+        RayTargets.build(tables, np.arange(tables.num_objects)),
+        view.body_pos, view.body_quat, start.reshape(1, -1, 3), length.reshape(1, -1),
+    )  # fmt: skip
+    reach = np.asarray(every).reshape(1, LINES, 2, -1) + DEPTHS[:, None]
+    reach = np.where(ignored[..., None, None] == np.arange(tables.num_objects), np.inf, reach).min(axis=2)
+    reach = np.where(active[..., None], reach, np.inf)
+    ways = Ways(active, start, length, DEPTHS, ignored)
+    found = jax.jit(lambda p, q, w: first_met(FallPieces.of(tables), p, q, w))(view.body_pos, view.body_quat, ways)
+    np.testing.assert_allclose(found.depth, reach.min(-1), rtol=1e-5, atol=1e-5)
+    expected = np.where(np.isfinite(reach.min(-1)), reach.argmin(-1), -1)
+    np.testing.assert_array_equal(found.object, expected)
+    assert len(np.unique(expected)) > 8, "the lines meet many objects"
