@@ -1,13 +1,15 @@
 """The object library: converted models that can be added to any home when it is loaded (`load_scene(objects=...)`).
 
-One model of every category that is not fixed to a house, the first but for `MODELS`; the categories that the six
-activities are about have three (`ig2mj.tasks.variants`). All that an activity may place somewhere is there, also what
-homes have fixed but BEHAVIOR places; beds, sinks and cabinets belong to homes.
+One model of every category that is not fixed to a house, the first but for `MODELS`. The categories that the six
+activities are about have three (`ig2mj.tasks.variants`), those that iGibson does not have two. All that an activity may
+place somewhere is there, also what homes have fixed but BEHAVIOR places; beds, sinks and cabinets belong to homes.
 """
 
 from __future__ import annotations
 
 import pathlib
+
+from ig2mj.knowledge.further import further_categories
 
 from ..objects.catalogue import catalogue
 
@@ -27,6 +29,7 @@ PACKED = ("backpack", "casserole", "jeans", "pumpkin", "stocking", "sweater", "t
 """What activities pack, or put something into: folded, small, large or hollow from model 4 on."""
 
 MODELS = {
+    **dict.fromkeys(further_categories(), (0, 1)),
     "carton": (5, 2),
     **dict.fromkeys(("dishtowel", "rag"), (5, 0)),
     "shelf": (14,),

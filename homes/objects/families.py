@@ -3,6 +3,8 @@
 from . import (
     appliances,
     bathroom,
+    behavior_food,
+    behavior_things,
     books,
     bottles,
     cabinets,
@@ -40,6 +42,8 @@ from . import (
 FAMILIES = (
     appliances,
     bathroom,
+    behavior_food,
+    behavior_things,
     books,
     bottles,
     cabinets,

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from ig2mj.errors import UnknownNameError
 from ig2mj.knowledge.ability_table import ABILITIES, Ability
+from ig2mj.knowledge.further import further_categories
 from ig2mj.knowledge.overrides import Changes, Overrides, shipped_overrides
 from ig2mj.knowledge.taxonomy import synset, taxonomy
 
@@ -26,7 +27,7 @@ def abilities(
     dusty and stained above 0.75). Temperatures are degrees Celsius, heating rates 1/s, lengths metres, forces newtons.
 
     Args:
-      category: iGibson category. One that the taxonomy does not know has no abilities but those an override gives.
+      category: iGibson category, or one of `further_categories`. Others have no abilities but those of an override.
       model: model name within the category, for overrides per model.
       compat: "paper", or "igibson" for the code's rule where the two differ (docs/design/rules.md).
       overrides: a project's own, from `load_overrides`.
@@ -80,7 +81,8 @@ def _shipped(
     category: str, model: str | None, compat: Compat
 ) -> tuple[tuple[str, tuple[tuple[str, float | bool], ...]], ...]:
     name = synset(category)
-    found: Abilities = {} if name is None else {a: _numbers(p) for a, p in taxonomy()[name].abilities.items()}
+    given = further_categories().get(category, {}) if name is None else taxonomy()[name].abilities
+    found: Abilities = {a: _numbers(p) for a, p in given.items()}
     _change(found, shipped_overrides(), category, model, compat)
     return tuple((a, tuple(p.items())) for a, p in _settle(found).items())
 

@@ -11,6 +11,7 @@ import dataclasses
 import functools
 
 from ig2mj.knowledge import abilities, categories, categories_of, synset, taxonomy
+from ig2mj.knowledge.further import further_categories
 from ig2mj.tasks.bddl import behavior1k
 
 FLOOR = "floor.n.01"
@@ -82,7 +83,7 @@ def kinds(name: str, behavior_1k: bool = False) -> Kinds:
     if not behavior_1k or name not in behavior1k.hierarchy():
         return Kinds(())
     above, own = behavior1k.hierarchy()[name]
-    known = set(categories())
+    known = {*categories(), *further_categories()}
     stem = name.split(".")[0]
     content, _, container_kind = stem.rpartition("__")
     if container_kind in CONTAINERS and not content.endswith("__of"):
