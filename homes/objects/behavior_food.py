@@ -159,7 +159,7 @@ CATEGORIES = [
     Entry("pea_pod", bent, (0.090, 0.026, 0.015), 0.007, 2, options={"skins": (GREEN, "leaf"), "curve": 16.0,
           "taper": 0.3}),
     Entry("leek", leek, (0.380, 0.060, 0.036), 0.20, 2),
-    Entry("hard-boiled_egg", boiled_egg, (0.058, 0.044, 0.044), 0.055, 2, uniform=True),
+    Entry("hard-boiled_egg", boiled_egg, (0.058, 0.044, 0.044), 0.055, 2, uniform=True, flesh=_flesh((0.96, 0.78, 0.26))),
     Entry("tortilla", flat_round, (0.200, 0.200, 0.006), 0.05, 2, uniform=True, options={"colours": ((0.93, 0.86, 0.68),
           (0.88, 0.76, 0.50))}),
     Entry("pizza_dough", flat_round, (0.240, 0.240, 0.024), 0.30, 2, uniform=True, options={"colours": ((0.93, 0.88,
