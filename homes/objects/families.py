@@ -3,6 +3,7 @@
 from . import (
     appliances,
     bathroom,
+    behavior_devices,
     behavior_food,
     behavior_things,
     books,
@@ -42,6 +43,7 @@ from . import (
 FAMILIES = (
     appliances,
     bathroom,
+    behavior_devices,
     behavior_food,
     behavior_things,
     books,
