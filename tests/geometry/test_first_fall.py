@@ -23,7 +23,7 @@ def _world(count: int) -> HandWorld:
         boxes = tuple((tuple(RNG.uniform(-0.2, 0.2, 3)), tuple(RNG.uniform(0.05, 0.3, 3))) for _ in range(3))
         items.append(
             Item(
-                f"box{n}", boxes, pos=tuple(RNG.uniform(-1, 1, 3) + (0, 0, 1)), quat=tuple(quat / np.linalg.norm(quat))
+                f"box{n}", boxes, pos=tuple(RNG.uniform((-1, -1, 0), (1, 1, 2))), quat=tuple(quat / np.linalg.norm(quat))
             )
         )
     return HandWorld(*items)

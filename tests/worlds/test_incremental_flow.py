@@ -1,4 +1,4 @@
-"""Steps in which only contents and coats change are those of the plain path, bit for bit, and take one small program."""
+"""Steps in which only contents and coats change are those of the plain path, bit for bit, by one small program."""
 
 from __future__ import annotations
 
