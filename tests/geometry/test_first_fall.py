@@ -19,13 +19,9 @@ def _world(count: int) -> HandWorld:
     """A floor and boxes in disorder over it."""
     items = [Item("floor", (((0, 0, -0.1), (3, 3, 0.1)),), fixed=True)]
     for n in range(count):
-        quat = RNG.normal(size=4)
+        quat, pos = RNG.normal(size=4), tuple(RNG.uniform((-1, -1, 0), (1, 1, 2)))
         boxes = tuple((tuple(RNG.uniform(-0.2, 0.2, 3)), tuple(RNG.uniform(0.05, 0.3, 3))) for _ in range(3))
-        items.append(
-            Item(
-                f"box{n}", boxes, pos=tuple(RNG.uniform((-1, -1, 0), (1, 1, 2))), quat=tuple(quat / np.linalg.norm(quat))
-            )
-        )
+        items.append(Item(f"box{n}", boxes, pos=pos, quat=tuple(quat / np.linalg.norm(quat))))
     return HandWorld(*items)
 
 
