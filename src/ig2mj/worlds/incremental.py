@@ -287,13 +287,13 @@ class _StatePrograms:
         """A step of contents and coats: leaves after it, its streams, whether it is complete, and whether it changes
         something. `streams`: of the last step, where nothing has moved since."""
         given = self._no_streams if streams is None else streams
-        made, streams, complete, changes = self._flow.flat(
+        made, ended, complete, changes = self._flow.flat(
             [view, *leaves, *given, np.array(streams is not None)], self._with_streams
         )
         leaves = list(leaves)
         for place, leaf in zip(self._flow_places, made, strict=True):
             leaves[place] = leaf
-        return leaves, streams, bool(complete), bool(changes)
+        return leaves, ended, bool(complete), bool(changes)
 
     @functools.cached_property
     def heat_takes(self) -> frozenset[str]:
