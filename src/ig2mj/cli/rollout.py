@@ -48,8 +48,8 @@ def run(
     Args:
       env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them), or a task of a file of
         yours: my_tasks.py:MugToTable.
-      agent: zero (no motion), random, expert (scripted; the six activities have one), or a policy: a file written by
-        `ig2mj train`, or the name of one that ships.
+      agent: zero (no motion), random, expert (scripted for the six activities, the planner for those of BEHAVIOR), or
+        a policy: a file written by `ig2mj train`, or the name of one that ships.
       robot: {robots}, or a folder that `ig2mj convert robot` wrote; default: the task's first robot.
       grasping: mitten (a hand holds the task's first object from the first touch on), assisted, sticky or physical
         (docs/guide/environments.md); default: the task's.

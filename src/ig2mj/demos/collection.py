@@ -38,8 +38,9 @@ EPISODES_PER_JOB = 32
 DISTURBED_STEPS = 5
 """Steps of one random action that a disturbance lasts."""
 
-HOPELESS = 50
-"""Failed episodes after which a success rate below one in eleven ends a collection."""
+HOPELESS, HOPELESS_PLANS = 50, 12
+"""Failed episodes, of a scripted expert and of the planner, whose episodes take minutes, after which a success rate
+below one in eleven ends a collection."""
 
 FAILED = "failed"
 """Attribute of a file: number of failed episodes, which are left out."""
@@ -106,6 +107,7 @@ def _play(
     state, step = env.reset(seed), np.zeros(env.num_worlds, int)
     wild, left, kept, failed = np.zeros((worlds, size)), np.zeros(worlds, int), 0, 0
     noisy = getattr(expert, "noisy", np.ones(size, bool))
+    hopeless = HOPELESS_PLANS if hasattr(expert, "given_up") else HOPELESS
     while kept < episodes:
         label = np.clip(np.asarray(expert(state)), -1, 1)
         begins = (left <= 0) & (rng.random(worlds) < disturbed)
@@ -118,7 +120,7 @@ def _play(
         done, success = np.asarray(state.done), np.asarray(state.info["success"])
         kept += int((done & success).sum())
         failed += int((done & ~success).sum())
-        if failed >= HOPELESS and kept * 10 < failed:
+        if failed >= hopeless and kept * 10 < failed:
             raise Ig2mjError(f"the expert failed in {failed} of {failed + kept} episodes")
         lost = np.asarray(getattr(expert, "given_up", done & ~done)) & ~done
         if lost.any():  # the planner has no plan left: the rest of the episode would be of no use
