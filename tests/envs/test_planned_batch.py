@@ -52,6 +52,8 @@ def test_an_episode_whose_time_is_over_has_no_success(make):
         assert np.isfinite(batch.spent.stepping)
 
 
-def test_a_robot_that_cannot_be_planned_for_is_refused(make):
+def test_a_robot_that_cannot_be_planned_for_is_refused(make, monkeypatch):
+    env = make("native")
+    monkeypatch.setattr(env, "robot", "turtlebot")
     with pytest.raises(PlanningError, match="turtlebot"):
-        PlannedBatch(make("native", robot="turtlebot"))
+        PlannedBatch(env)
