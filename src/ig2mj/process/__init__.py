@@ -9,6 +9,8 @@ or earlier by any caller; a second call does nothing. What the user has decided 
 `prepare_jax` (every engine):
   - JAX's option `jax_compilation_cache_dir`: compiled programs are kept in ig2mj's cache folder, unless it has a value;
     then also `jax_persistent_cache_min_compile_time_secs`, 0: all programs are kept.
+  - Entries of that cache are written whole or not at all, and broken ones are removed
+    (`ig2mj.process.program_cache`).
   - JAX's monitoring gets two listeners: long compilations are reported on stderr.
 
 `run_programs_inline` (a simulation of one world; batches and environments, unless of another engine than the native):

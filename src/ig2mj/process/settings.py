@@ -18,6 +18,7 @@ from ig2mj.process.compilation import (
     report_warp_compilation,
     report_xla_compilation,
 )
+from ig2mj.process.program_cache import keep_entries_sound, say_not_kept
 
 GL_INSTALL_HINT = "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6"
 
@@ -36,15 +37,18 @@ def prepare_jax() -> pathlib.Path | None:
     import jax
 
     report_xla_compilation()
+    keep_entries_sound()
     chosen = getattr(jax.config, "jax_compilation_cache_dir", None)
     if chosen:
         return pathlib.Path(chosen)
     folder = cache_folder() / "jax"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    except OSError as failure:
+        say_not_kept(folder, failure.strerror or type(failure).__name__)
         return None
     if not os.access(folder, os.W_OK):
+        say_not_kept(folder, "it cannot be written to")
         return None
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", MIN_COMPILE_SECONDS)
