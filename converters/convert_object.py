@@ -26,7 +26,7 @@ from .bodies.inertia import MassRule
 from .bodies.joint_limits import start_positions
 from .bodies.kinematics import model_bounds
 from .bodies.placements import Placement, make_halves
-from .bodies.robot_description import ROBOT_FILE, put_on_floating_base, robot_json
+from .bodies.robot_description import ROBOT_FILE, drop_markers, put_on_floating_base, robot_json
 from .finish import ConversionOutcome, finish, version_record
 from .hulls.pieces import HullOptions
 from .mjcf.appearance import add_ground, add_setting
@@ -119,6 +119,7 @@ def _read(
     if category == ROBOT_CATEGORY:
         source.model = model or file_slug(source.title or name)
         put_on_floating_base(source)
+        drop_markers(source)
     elif knowledge.synset(category) is None and not (marks and marks.abilities):
         near = difflib.get_close_matches(category, knowledge.categories(), n=3, cutoff=0.6)
         hint = f"; near matches: {', '.join(near)}" if near else ""

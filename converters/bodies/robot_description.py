@@ -10,11 +10,14 @@ from ig2mj.errors import InputError
 
 from ..base.description import ObjectModel
 from .joint_limits import clamp, is_locked
-from .kinematics import link_poses
+from .kinematics import link_poses, shape_bounds
 
 ROBOT_FILE = "robot.json"
 
 FORMAT_VERSION = 1
+
+MARKER_SIZE, MARKER_MASS = 0.01, 1e-3
+"""m and kg: most of a marker."""
 
 LAST_JOINTS = 2
 """Joints in a row at the end of an arm whose links may hold something."""
@@ -35,6 +38,27 @@ def put_on_floating_base(source: ObjectModel) -> None:
     elif floating:
         element = f"joint '{floating[0].name}'"
         raise InputError(source.file, "a floating joint cuts the robot in two", element=element, fix="make it fixed")
+
+
+def drop_markers(source: ObjectModel) -> None:
+    """Takes their collision shapes from links that mark a point, as the one between two fingers where they grasp.
+
+    Such a link is fixed, nothing hangs on it, and it has at most `MARKER_SIZE` and `MARKER_MASS`.
+    """
+    carrying = {joint.parent for joint in source.joints.values()}
+    for joint in source.joints.values():
+        link = source.links[joint.child]
+        if joint.type != "fixed" or link.name in carrying or link.inertial is None or not link.collisions:
+            continue
+        boxes = [box for shape in link.collisions if (box := shape_bounds(shape)) is not None]
+        if not boxes or link.inertial.mass > MARKER_MASS:
+            continue
+        size = np.max([box[1] for box in boxes], axis=0) - np.min([box[0] for box in boxes], axis=0)
+        if size.max() <= MARKER_SIZE:
+            link.collisions = []
+            source.warnings.append(
+                f"link '{link.name}' ({1000 * size.max():.0f} mm) marks a point and does not collide"
+            )
 
 
 def grasping_links(source: ObjectModel) -> set[str]:

@@ -1,7 +1,8 @@
 """Forward kinematics, Jacobian and inverse kinematics of a chain of joints: pure JAX, from a table, for any batch.
 
 The frames of a chain's links are parallel at joint positions 0, as in Fetch's description. Everything is in the frame
-of the chain's base. Axes: W worlds, J joints.
+of the chain's base. Axes: W worlds, J joints that are moved, K joints of the chain: those, and joints that follow them,
+such as the segments of a telescope.
 """
 
 from __future__ import annotations
@@ -32,14 +33,53 @@ class Chain:
       axis: unit vectors, in the link's own frame. slides: the joint slides along it instead of turning about it.
       lower, upper: rad or m; infinite where a joint turns without end.
       tip: of the chain in the last link's frame, m; its orientation is the link's.
+      follows: of each joint of the chain the number of the moved joint that it goes with, the factor of that one's
+        position, and what is added, rad or m; None: each is moved itself.
     """
 
-    origin: Float[np.ndarray, "J 3"]
-    axis: Float[np.ndarray, "J 3"]
-    slides: Bool[np.ndarray, "J"]
+    origin: Float[np.ndarray, "K 3"]
+    axis: Float[np.ndarray, "K 3"]
+    slides: Bool[np.ndarray, "K"]
     lower: Float[np.ndarray, "J"]
     upper: Float[np.ndarray, "J"]
     tip: Float[np.ndarray, "3"]
+    follows: tuple[tuple[int, float, float], ...] | None = None
+
+    @property
+    def sources(self) -> tuple[tuple[int, float, float], ...]:
+        """`follows` of every joint of the chain."""
+        return self.follows or tuple((j, 1.0, 0.0) for j in range(len(self.slides)))
+
+    @property
+    def sliding(self) -> Bool[np.ndarray, "J"]:
+        """Of the joints that are moved: they slide."""
+        found = np.zeros(len(self.lower), bool)
+        for (source, _, _), slides in zip(self.sources, self.slides, strict=True):
+            found[source] |= slides
+        return found
+
+    @property
+    def travel(self) -> Float[np.ndarray, "J"]:
+        """m by which the tip slides between the limits of each joint that is moved, with those that follow; 0 of joints
+        that turn."""
+        rates = np.zeros(len(self.lower))
+        for (source, rate, _), slides in zip(self.sources, self.slides, strict=True):
+            rates[source] += abs(rate) if slides else 0.0
+        return np.where(rates > 0, rates * np.where(rates > 0, self.upper - self.lower, 0.0), 0.0)
+
+    def upright(self, least: float = 0.9) -> int:
+        """Number of joints at the beginning of the chain that slide vertically: a lift."""
+        level = ~(self.slides & (np.abs(self.axis[:, 2]) >= least))
+        return int(np.argmax(level)) if level.any() else len(level)
+
+    def part(self, count: int) -> Chain:
+        """The first joints of the chain; the tip is where the last of them is."""
+        follows = None if self.follows is None else self.follows[:count]
+        moved = 1 + max((source for source, _, _ in self.sources[:count]), default=-1)
+        return Chain(
+            self.origin[:count], self.axis[:count], self.slides[:count], self.lower[:moved], self.upper[:moved],
+            np.zeros(3), follows,
+        )  # fmt: skip
 
 
 def forward(
@@ -50,22 +90,31 @@ def forward(
     pos = jnp.zeros((*q.shape[:-1], 3), q.dtype)
     quat = jnp.broadcast_to(jnp.array([1.0, 0.0, 0.0, 0.0], q.dtype), (*q.shape[:-1], 4))
     places, axes = [], []
-    for j, (origin, axis, slides) in enumerate(zip(chain.origin, chain.axis, chain.slides, strict=True)):
+    for (source, rate, shift), origin, axis, slides in zip(
+        chain.sources, chain.origin, chain.axis, chain.slides, strict=True
+    ):
+        at = q[..., source]
+        if (rate, shift) != (1.0, 0.0):
+            at = rate * at + shift
         origin, axis = jnp.asarray(origin, q.dtype), jnp.asarray(axis, q.dtype)
         pos = pos + quat_rotate(quat, origin)
         along = quat_rotate(quat, axis)
         places.append(pos)
         axes.append(along)
         if slides:
-            pos = pos + along * q[..., j, None]
+            pos = pos + along * at[..., None]
         else:
-            quat = quat_multiply(quat, axis_angle_to_quat(axis, q[..., j]))
+            quat = quat_multiply(quat, axis_angle_to_quat(axis, at))
     tip = pos + quat_rotate(quat, jnp.asarray(chain.tip, q.dtype))
-    columns = [
-        jnp.concatenate([along, jnp.zeros_like(along)] if slides else [jnp.cross(along, tip - place), along], axis=-1)
-        for place, along, slides in zip(places, axes, chain.slides, strict=True)
-    ]
-    return tip, quat, jnp.stack(columns, axis=-1)
+    columns: list[Array | None] = [None] * q.shape[-1]
+    for (source, rate, _), place, along, slides in zip(chain.sources, places, axes, chain.slides, strict=True):
+        column = jnp.concatenate(
+            [along, jnp.zeros_like(along)] if slides else [jnp.cross(along, tip - place), along], axis=-1
+        )
+        column, before = column if rate == 1.0 else rate * column, columns[source]
+        columns[source] = column if before is None else before + column
+    none = jnp.zeros((*tip.shape[:-1], 6), q.dtype)
+    return tip, quat, jnp.stack([none if column is None else column for column in columns], axis=-1)
 
 
 def inverse(

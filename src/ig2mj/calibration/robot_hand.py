@@ -9,6 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.agents.urdf import UrdfRobot
+from ig2mj.agents.urdf.following import FollowingJoints
+from ig2mj.agents.urdf.grip import jaw_frame
 from ig2mj.calibration.robot_place import collisions
 from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene
@@ -54,10 +56,12 @@ class Arm:
         self._low = np.array([j.range[0] if scene.model.jnt_limited[j.id] else -np.pi for j in joints])
         self._high = np.array([j.range[1] if scene.model.jnt_limited[j.id] else np.pi for j in joints])
         self._body = scene.model.body(hand.palm).id
+        self._following = FollowingJoints(scene.model, [j.name for j in joints])
 
     def put(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Grasp point, approach and finger axis in the world, with the arm's joints at q."""
         self.data.qpos[self._qpos] = q
+        self._following.put(self.data)
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
         turn = self.data.xmat[self._body].reshape(3, 3)
@@ -82,7 +86,10 @@ class Arm:
             if across is not None:
                 turn = turn + np.cross(side, across if side @ across >= 0 else -across)
             error = np.concatenate([point - at, weight * turn])
-            jacobian = np.concatenate([moves, weight * turns])[:, self._dof]
+            columns = np.concatenate([moves, weight * turns])
+            jacobian = columns[:, self._dof]
+            for dof, leader, rate in self._following.rates(self.data):
+                jacobian[:, leader] += rate * columns[:, dof]
             if across is None:  # turning about the approach is free
                 jacobian[3:] -= np.outer(along, along @ jacobian[3:])
             step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-4 * np.eye(6), error)
@@ -125,6 +132,9 @@ def hand_of(robot: UrdfRobot) -> Hand:
     across = two - one
     opening = float(np.linalg.norm(across))
     across = across / max(opening, 1e-9)
+    jaw = None if suction else jaw_frame(body, next(one for one in layout.grippers if one.hand == link))
+    if jaw is not None:
+        across, point = jaw.across, jaw.point
     fingers = {*ray.start_bodies}, {*ray.end_bodies}
     if suction:
         opening = np.inf
@@ -141,7 +151,7 @@ def hand_of(robot: UrdfRobot) -> Hand:
         across = np.cross(approach, np.eye(3)[int(np.argmin(np.abs(approach)))])
         across = across / np.linalg.norm(across)
     else:
-        approach = point - across * (point @ across)
+        approach = point - across * (point @ across) if jaw is None else jaw.ahead
         approach = approach / max(float(np.linalg.norm(approach)), 1e-9)
     single = len(layout.grippers) == 1
     close = f"{link}_suction" if suction else "gripper" if single else f"{link}_gripper"

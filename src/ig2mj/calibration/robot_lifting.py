@@ -156,8 +156,9 @@ def lift(
             at, _, _ = arm.solve(at, spot - left * HOVER * approach, approach, axis)
             way.append(at)
         move, reason = functools.partial(_move, simulation, hand), ""
+        closing = 10 + math.ceil(_closing_time(robot) / ACTION_PERIOD)
         for stage, (postures, grip, settle) in enumerate(
-            (([before], 1.0, 3), (way, 1.0, 5), (way[-1:], -1.0, 10), ([raised], -1.0, 10))
+            (([before], 1.0, 3), (way, 1.0, 5), (way[-1:], -1.0, closing), ([raised], -1.0, 10))
         ):
             for posture in postures[:-1]:
                 move(posture, grip, 0)
@@ -272,6 +273,12 @@ def _places(
         for k in np.argsort(-near)[:: max(1, len(good) // PLACES)][:PLACES]:
             order = np.argsort(np.linalg.norm(points - points[k], axis=1))[:NEAREST]
             yield name, points[k], good[k][2] / np.linalg.norm(good[k][2]), [good[i][0] for i in order]
+
+
+def _closing_time(robot: UrdfRobot) -> float:
+    """s that the slowest finger takes from one limit to the other."""
+    ways = [(np.ptp(robot.body.limits(name)), robot.description.joint(name).speed) for name in robot.layout.gripper]
+    return max((float(way / speed) for way, speed in ways), default=0.0)
 
 
 def _move(simulation: Simulation, hand: Hand, q: np.ndarray, grip: float, settle: int = 3, speed: float = 0.5) -> None:

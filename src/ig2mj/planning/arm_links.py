@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from ig2mj.agents.urdf.following import FollowingJoints
 from ig2mj.geometry.host_rotations import (
     quat_rotate,
 )
@@ -83,7 +84,9 @@ class LinkSpheres:
         joints = [model.joint(tables.agent_joint_names[j]) for j in arm.joints]
         self._qpos = np.array([j.qposadr[0] for j in joints])
         own = [int(model.jnt_bodyid[j.id]) for j in joints]
-        root = own[int(np.argmin(arm.chain.slides))]
+        first = arm.chain.sources[min(arm.chain.upright(), len(arm.chain.slides) - 1)][0]
+        root = own[first]
+        self._following = FollowingJoints(model, [j.name for j in joints])
         mine = np.flatnonzero(tables.body_agent == agent)
         self.bodies: Int[np.ndarray, "n"] = np.array([b for b in mine if _below(model, int(b), root)])
         self._base = model.body(name).id
@@ -114,6 +117,7 @@ class LinkSpheres:
         found, data = [], self._data
         for q in joints:
             data.qpos[self._qpos] = q
+            self._following.put(data)
             mujoco.mj_kinematics(self._model, data)
             turn, pos = data.xmat[self._base].reshape(3, 3), data.xpos[self._base]
             for geom, spheres in self._geoms:

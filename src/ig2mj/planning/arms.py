@@ -20,9 +20,10 @@ from jaxtyping import Float
 from ig2mj.agents.base import ACTION_PERIOD, Controller
 from ig2mj.agents.fetch.controller import GAIN, FetchController
 from ig2mj.agents.fetch.robot import HAND as FETCH_HAND
-from ig2mj.agents.kinematics import Chain, forward
+from ig2mj.agents.kinematics import forward
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.agents.urdf.controller import UrdfController
+from ig2mj.agents.urdf.grip import JawFrame, jaw_frame
 from ig2mj.agents.urdf.robot import UrdfRobot
 from ig2mj.geometry.host_rotations import (
     length,
@@ -64,14 +65,13 @@ class ArmBody(WheeledBody):
         self.model, self._controller = model, controller
         pos, quat = model.hand(model.rest[None])
         self.rest, self.carry, self._rest_quat = pos, pos.copy(), quat[0]
-        first = int(np.argmin(model.chain.slides))
-        low, high = (np.where(model.chain.slides, v, 0.0) for v in (model.chain.lower, model.chain.upper))
-        lift = np.where(model.chain.slides, (low + high) / 2, model.rest)[: first + 1]
-        start = Chain(*(v[: first + 1] for v in _columns(model.chain)), tip=np.zeros(3))
+        chain, first = model.chain, model.chain.upright()
+        low, high = (np.where(chain.sliding, v, 0.0) for v in (chain.lower, chain.upper))
+        start = chain.part(first + 1)
+        lift = np.where(chain.sliding, (low + high) / 2, model.rest)[: len(start.lower)]
         self.shoulders = np.asarray(forward(start, jnp.asarray(lift[None], jnp.float32))[0], float)
-        links = np.linalg.norm(model.chain.origin[first + 1 :], axis=1).sum() + np.linalg.norm(model.chain.tip)
-        travel = (model.chain.upper - model.chain.lower)[model.chain.slides]
-        self.reach = float(links + np.linalg.norm(model.offset) + travel.sum() / 2)
+        links = np.linalg.norm(chain.origin[first + 1 :], axis=1).sum() + np.linalg.norm(chain.tip)
+        self.reach = float(links + np.linalg.norm(model.offset) + chain.travel.sum() / 2)
         self.away = ASIDE * float(links)
         self._links = LinkSpheres(scene, agent, model)
         self.arm, self.trunk = self._links.bodies, self._links.trunk
@@ -222,6 +222,13 @@ class ArmFollower:
         return self._obstacles.clear(np.column_stack([centres, spheres[:, 3]]))
 
 
+def _jaw(robot: TaskRobot) -> JawFrame | None:
+    """`jaw_frame` of a robot's gripper."""
+    if not isinstance(robot, UrdfRobot) or not robot.layout.grippers:
+        return None
+    return jaw_frame(robot.body, robot.layout.grippers[0])
+
+
 def _gripper(
     scene: Scene, agent: int, hand: int, grip: Float[np.ndarray, "3"]
 ) -> tuple[Float[np.ndarray, "3 3"], float, Float[np.ndarray, "S 4"]]:
@@ -244,6 +251,8 @@ def _gripper(
     opening = float(np.linalg.norm(across))
     across = across / max(opening, 1e-9)
     ahead = (one + two) / 2
+    if (jaw := _jaw(robot)) is not None:
+        across, ahead = jaw.across, jaw.ahead
     ahead = ahead - across * (ahead @ across)
     if isinstance(robot, UrdfRobot) and np.linalg.norm(ahead) > 1e-3:
         ahead = ahead / np.linalg.norm(ahead)
@@ -259,7 +268,3 @@ def _gripper(
         local = ((centres - pos) @ turn - grip) @ frame
         found.append(np.column_stack([local, own[:, 3]]))
     return frame, opening, np.concatenate(found)
-
-
-def _columns(chain: Chain) -> tuple[np.ndarray, ...]:
-    return chain.origin, chain.axis, chain.slides, chain.lower, chain.upper

@@ -278,15 +278,22 @@ class RobotBody:
         return [self.model.joint(j).name.removeprefix(prefix) for j in self._scalar]
 
     def chain(self, layout: Layout, hand: str) -> Chain | None:
-        """The arm's joints from the base to a hand, frames parallel at joint positions 0; None where there are none."""
+        """The arm's joints from the base to a hand, and those between them that follow one of the arm's; frames
+        parallel at joint positions 0. None where there are none."""
         link, _, _ = self.frame(hand)
+        moved = [layout.arm[k] for k in self.chain_joints(layout, hand)]
         body, path = self.model.body(self._own(link)).id, []
-        named = {f"{self.description.name}_{name}": name for name in layout.arm}
+        sources = {f"{self.description.name}_{name}": (k, 1.0, 0.0) for k, name in enumerate(moved)}
+        for name in self.couplings:
+            leader = self._leader(name)
+            if leader in moved:
+                at = self._position(name, {}), self._position(name, {leader: 1.0})
+                sources[f"{self.description.name}_{name}"] = (moved.index(leader), at[1] - at[0], at[0])
         while body > 0:
             for joint in range(
                 self.model.body_jntadr[body], self.model.body_jntadr[body] + self.model.body_jntnum[body]
             ):
-                if self.model.joint(joint).name in named:
+                if self.model.joint(joint).name in sources:
                     path.insert(0, joint)
             body = int(self.model.body_parentid[body])
         if not path:
@@ -294,8 +301,9 @@ class RobotBody:
         base = self._data.body(self._own(self.description.base))
         turn = base.xmat.reshape(3, 3).T
         anchors = (self._data.xanchor[path] - base.xpos) @ turn.T
-        names = [named[self.model.joint(j).name] for j in path]
-        bounds = np.array([self.limits(name) for name in names])
+        follows = tuple(sources[self.model.joint(j).name] for j in path)
+        bounds = np.array([self.limits(name) for name in moved])
+        each = tuple((k, 1.0, 0.0) for k in range(len(path)))
         return Chain(
             origin=np.diff(anchors, axis=0, prepend=np.zeros((1, 3))),
             axis=self._data.xaxis[path] @ turn.T,
@@ -303,15 +311,25 @@ class RobotBody:
             lower=bounds[:, 0],
             upper=bounds[:, 1],
             tip=self.pose(link)[0] - anchors[-1],
+            follows=None if follows == each else follows,
         )
 
+    def _leader(self, joint: str) -> str:
+        """The joint that a joint follows, over others; itself where it follows none."""
+        while (coupling := self.couplings.get(joint)) is not None and coupling.leader is not None:
+            joint = coupling.leader
+        return joint
+
     def chain_joints(self, layout: Layout, hand: str) -> list[int]:
-        """Which of the arm's joints are those of a hand's chain, by their place in the layout."""
+        """Which of the arm's joints move a hand, themselves or by others that follow them, by their place in the layout;
+        those nearer to the base first."""
         link, _, _ = self.frame(hand)
         above, found = {j.child: j for j in self.description.joints}, []
         while link in above:
             joint = above[link]
-            if joint.name in layout.arm:
-                found.insert(0, layout.arm.index(joint.name))
+            leader = self._leader(joint.name)
+            if leader in layout.arm:
+                at = layout.arm.index(leader)
+                found = [at, *(k for k in found if k != at)]
             link = joint.parent
         return found

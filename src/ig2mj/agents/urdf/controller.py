@@ -9,6 +9,7 @@
 | `<link>_suction` for each suction cup | off from 0 on, on below |
 
 Velocities of the arm become positions of servos, which go on from the last ones and not from where the arm sags to.
+Fingers open and close at the speed of their joints, so that they meet what lies between them and do not knock it away.
 
 Axes: W worlds, J joints of the arm, G grippers and suction cups, F joints of all grippers.
 """
@@ -110,6 +111,8 @@ class UrdfController:
         closes_low = np.array(
             [grippers[g].closes_low(n) for g, n in zip(self._gripper_of, layout.gripper, strict=True)], bool
         )
+        speeds = np.array([description.joint(n).speed for n in layout.gripper], np.float32)
+        self._finger_step = (speeds * period).astype(np.float32)
         self._open = np.where(closes_low, ends[:, 1], ends[:, 0])
         self._closed = np.where(closes_low, ends[:, 0], ends[:, 1])
         self._start = np.array([body.start_of(n, layout) for n in (*layout.arm, *layout.gripper)], np.float32)
@@ -176,6 +179,9 @@ class UrdfController:
         closed, fingers, of = action[:, end:] < 0, state.fingers, self._gripper_of
         if len(self._fingers):
             asked = jnp.where(closed[:, of], self._closed, self._open)
+            turns = closed[:, of] != state.closed[:, of]
+            begin = jnp.where(turns, q[:, self._fingers], state.fingers)
+            asked = begin + jnp.clip(asked - begin, -self._finger_step, self._finger_step)
             frozen = jnp.where((held & ~state.held)[:, of], q[:, self._fingers], state.fingers)
             fingers = jnp.where(held[:, of], frozen, asked)
         cups = closed[:, self._grippers :].astype(jnp.float32)

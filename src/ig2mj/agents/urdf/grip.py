@@ -35,6 +35,13 @@ OPPOSITE = 2
 FAR = 0.9
 """Share of the farthest finger's distance from the hand up to which a part of it is a finger."""
 
+NEARLY = 0.1
+"""Share of its way by which a jaw is open that is about to meet the hand."""
+
+JAW_HOLDS, ALONG_FACE = 0.026, 0.012
+"""m between the fixed part of a gripper with one jaw and the middle of what it is to hold; m before and beyond that
+middle at which the direction of the fixed part's face is measured."""
+
 CUP, SUCTION_REACH = 0.006, 0.03
 """m: half the distance between the rays of a suction cup, and how far they lead out of it."""
 
@@ -196,6 +203,52 @@ def _against_palm(
     there = _to_base(body, hand, palm, closed)
     ends = [palm[np.argmin(np.linalg.norm(there - p, axis=1))] for p in _to_base(body, finger, starts, closed)]
     return starts, [(hand, np.array(ends))]
+
+
+@dataclasses.dataclass(frozen=True)
+class JawFrame:
+    """Of a gripper whose only finger closes against the hand, in the palm's frame: the middle of what it holds (m), and
+    unit vectors from the finger to the hand, at right angles to the hand's face, and along that face."""
+
+    point: np.ndarray
+    across: np.ndarray
+    ahead: np.ndarray
+
+
+def jaw_frame(body: RobotBody, gripper: Gripper) -> JawFrame | None:
+    """That of a gripper with one finger; None: it has several, or none.
+
+    Such a jaw turns by up to 90 degrees: where it is open its way does not lead across the hand. What it holds comes to
+    lie against the part that does not move.
+    """
+    tips = finger_tips(body, gripper)
+    if len(tips) != 1:
+        return None
+    hand, places, ends = body.frame(gripper.hand)[0], [], np.zeros(3)
+    for share in (NEARLY, 0.0):
+        limits = {n: body.limits(n)[:: 1 if gripper.closes_low(n) else -1] for n in gripper.joints}
+        data = body.posed({n: shut + share * (wide - shut) for n, (shut, wide) in limits.items()})
+        pos, turn = body.pose(hand, data)
+        starts, [(_, meets)] = _against_palm(body, gripper, tips[0], data)
+        places.append(turn.T @ (_to_base(body, tips[0], starts, data).mean(0) - pos))
+        ends = meets.mean(0)
+    across = _unit(places[1] - places[0])
+    point = ends - JAW_HOLDS * across
+    ahead = _unit(point - across * (point @ across))
+    data = body.posed({})
+    to_face = [body.shapes.distance_along(hand, point + share * ALONG_FACE * ahead, across, data) for share in (-1.0, 1.0)]
+    if None not in to_face:
+        near, far = to_face
+        assert near is not None and far is not None
+        if abs(far - near) < 2 * ALONG_FACE:
+            ahead = _unit(2 * ALONG_FACE * ahead + (far - near) * across)
+            across = _unit(across - ahead * (across @ ahead))
+            point = point + across * ((near + far) / 2 - JAW_HOLDS)
+    return JawFrame(point, across, ahead)
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / max(float(np.linalg.norm(vector)), 1e-9)
 
 
 def suction_rays(name: str, body: RobotBody, link: str) -> HandRays:

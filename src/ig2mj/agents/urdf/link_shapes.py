@@ -118,6 +118,15 @@ class LinkShapes:
             total += min(hits)
         return total
 
+    def distance_along(self, link: str, point: np.ndarray, way: np.ndarray, data: Any) -> float | None:
+        """m from a point to the link's collision geometry along a unit vector, both in its frame; None: it is not met.
+        data: of `posed`."""
+        body = data.body(self._body(link))
+        turn = body.xmat.reshape(3, 3)
+        start, along = body.xpos + turn @ point, turn @ way
+        hits = [self._ray(g, start, along, data) for g in self._geoms([link], self._base)]
+        return min((at for at in hits if at >= 0), default=None)
+
     def _geoms(self, names: Collection[str], agent: str) -> list[int]:
         """Collision geoms of links, by their bodies' names in a scene."""
         bodies = {self._body(self.base if name == agent else name.removeprefix(f"{agent}_")) for name in names}
