@@ -18,6 +18,7 @@ import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.urdf import UrdfRobot
+from ig2mj.agents.urdf.controller import finger_speeds
 from ig2mj.calibration.robot_hand import FREE_JOINTS, Arm, Hand, hand_of
 from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene, load_scene
@@ -277,8 +278,9 @@ def _places(
 
 def _closing_time(robot: UrdfRobot) -> float:
     """s that the slowest finger takes from one limit to the other."""
-    ways = [(np.ptp(robot.body.limits(name)), robot.description.joint(name).speed) for name in robot.layout.gripper]
-    return max((float(way / speed) for way, speed in ways), default=0.0)
+    ways = [float(np.ptp(robot.body.limits(name))) for name in robot.layout.gripper]
+    speeds = finger_speeds(robot.description, robot.layout, robot.body)
+    return max((way / float(speed) for way, speed in zip(ways, speeds, strict=True)), default=0.0)
 
 
 def _move(simulation: Simulation, hand: Hand, q: np.ndarray, grip: float, settle: int = 3, speed: float = 0.5) -> None:

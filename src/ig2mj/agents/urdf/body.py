@@ -321,8 +321,8 @@ class RobotBody:
         return joint
 
     def chain_joints(self, layout: Layout, hand: str) -> list[int]:
-        """Which of the arm's joints move a hand, themselves or by others that follow them, by their place in the layout;
-        those nearer to the base first."""
+        """Which of the arm's joints move a hand, themselves or by others that follow them, by their place in the
+        layout; those nearer to the base first."""
         link, _, _ = self.frame(hand)
         above, found = {j.child: j for j in self.description.joints}, []
         while link in above:

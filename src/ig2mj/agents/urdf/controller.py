@@ -9,7 +9,8 @@
 | `<link>_suction` for each suction cup | off from 0 on, on below |
 
 Velocities of the arm become positions of servos, which go on from the last ones and not from where the arm sags to.
-Fingers open and close at the speed of their joints, so that they meet what lies between them and do not knock it away.
+Fingers open and close at the speed of their joints, and in `CLOSING` at least, so that they do not knock away what lies
+between them.
 
 Axes: W worlds, J joints of the arm, G grippers and suction cups, F joints of all grippers.
 """
@@ -38,6 +39,18 @@ from ig2mj.scene.tables import SceneTables
 LEASH = 0.15
 """rad or m, on top of two actions at full speed, that a servo's target may be ahead of its joint: a blocked arm
 does not push ever harder."""
+
+
+CLOSING = 0.5
+"""s that fingers take from one limit to the other at least, as those of a Robotiq 2F-85 (150 mm/s) and a Panda do.
+Files often give the speed of a bare motor."""
+
+
+def finger_speeds(description: Description, layout: Layout, body: RobotBody) -> Float[np.ndarray, "F"]:
+    """rad/s or m/s of all joints of grippers."""
+    return np.array(
+        [min(description.joint(n).speed, float(np.ptp(body.limits(n))) / CLOSING) for n in layout.gripper], np.float32
+    )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -111,8 +124,7 @@ class UrdfController:
         closes_low = np.array(
             [grippers[g].closes_low(n) for g, n in zip(self._gripper_of, layout.gripper, strict=True)], bool
         )
-        speeds = np.array([description.joint(n).speed for n in layout.gripper], np.float32)
-        self._finger_step = (speeds * period).astype(np.float32)
+        self._finger_step = (finger_speeds(description, layout, body) * period).astype(np.float32)
         self._open = np.where(closes_low, ends[:, 1], ends[:, 0])
         self._closed = np.where(closes_low, ends[:, 0], ends[:, 1])
         self._start = np.array([body.start_of(n, layout) for n in (*layout.arm, *layout.gripper)], np.float32)

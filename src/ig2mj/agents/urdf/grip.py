@@ -38,6 +38,9 @@ FAR = 0.9
 NEARLY = 0.1
 """Share of its way by which a jaw is open that is about to meet the hand."""
 
+OUTER, JAW_LENGTH = (0.95, 0.8, 0.65, 0.5), 0.6
+"""Shares of the length of the only finger at which rays begin, and at which it holds."""
+
 JAW_HOLDS, ALONG_FACE = 0.026, 0.012
 """m between the fixed part of a gripper with one jaw and the middle of what it is to hold; m before and beyond that
 middle at which the direction of the fixed part's face is measured."""
@@ -199,7 +202,7 @@ def _against_palm(
     hand, palm = _palm_points(body, gripper)
     own = body.shapes.points(finger)
     outer = own[np.argsort(-np.linalg.norm(own, axis=1))]
-    starts = np.array([outer[0] * share for share in (0.95, 0.8, 0.65, 0.5)])
+    starts = np.array([outer[0] * share for share in OUTER])
     there = _to_base(body, hand, palm, closed)
     ends = [palm[np.argmin(np.linalg.norm(there - p, axis=1))] for p in _to_base(body, finger, starts, closed)]
     return starts, [(hand, np.array(ends))]
@@ -224,17 +227,27 @@ def jaw_frame(body: RobotBody, gripper: Gripper) -> JawFrame | None:
     tips = finger_tips(body, gripper)
     if len(tips) != 1:
         return None
-    hand, places, ends = body.frame(gripper.hand)[0], [], np.zeros(3)
+    hand, places, turns, ends = body.frame(gripper.hand)[0], [], [], np.zeros(3)
     for share in (NEARLY, 0.0):
         limits = {n: body.limits(n)[:: 1 if gripper.closes_low(n) else -1] for n in gripper.joints}
         data = body.posed({n: shut + share * (wide - shut) for n, (shut, wide) in limits.items()})
         pos, turn = body.pose(hand, data)
         starts, [(_, meets)] = _against_palm(body, gripper, tips[0], data)
-        places.append(turn.T @ (_to_base(body, tips[0], starts, data).mean(0) - pos))
+        places.append((_to_base(body, tips[0], starts, data) - pos) @ turn)
+        turns.append(turn.T @ body.pose(tips[0], data)[1])
         ends = meets.mean(0)
-    across = _unit(places[1] - places[0])
-    point = ends - JAW_HOLDS * across
-    ahead = _unit(point - across * (point @ across))
+    across = _unit((places[1] - places[0]).mean(0))
+    tip, foot = places[1][0], places[1][-1]
+    finger = tip + (OUTER[0] - JAW_LENGTH) / (OUTER[0] - OUTER[-1]) * (foot - tip)
+    point = finger + across * (ends - finger) @ across - JAW_HOLDS * across
+    hinge, towards = _axis(turns[0].T @ turns[1]), places[1][0] - places[1][-1]
+    if hinge is not None:  # what lies across the jaw does not lead along it
+        side = turns[1] @ hinge
+        points = (_to_base(body, tips[0], body.points(tips[0]), data) - pos) @ turn
+        spread = points @ side
+        point = point + side * ((spread.min() + spread.max()) / 2 - point @ side)
+        towards = towards - side * (towards @ side)
+    ahead = _unit(towards - across * (towards @ across))
     data = body.posed({})
     to_face = [body.shapes.distance_along(hand, point + share * ALONG_FACE * ahead, across, data) for share in (-1.0, 1.0)]
     if None not in to_face:
@@ -245,6 +258,14 @@ def jaw_frame(body: RobotBody, gripper: Gripper) -> JawFrame | None:
             across = _unit(across - ahead * (across @ ahead))
             point = point + across * ((near + far) / 2 - JAW_HOLDS)
     return JawFrame(point, across, ahead)
+
+
+def _axis(turn: np.ndarray) -> np.ndarray | None:
+    """Unit vector about which a rotation matrix turns; None: it does not."""
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, turn.ravel())
+    size = float(np.linalg.norm(quat[1:]))
+    return quat[1:] / size if size > NEARER else None
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
