@@ -75,6 +75,9 @@ OFF, OFF_FEW = 0.1, 0.5
 """rad between a hand's direction and its approach, of arms with six joints or more and with fewer; the latter then
 approach along the direction that their hand has."""
 
+TURNED_JOINTS = 5
+"""Joints with which an arm can at least turn its hand about its approach."""
+
 FEWEST, PLACES, NEAREST = 3, 12, 30
 """Postures with which an approach is tried; places tried for each; postures tried at each place."""
 
@@ -218,8 +221,8 @@ def _grasp(
 
 
 def _kept(side: np.ndarray, q: np.ndarray) -> np.ndarray | None:
-    """The finger axis that postures near q are to keep; None: the arm has too few joints to choose it."""
-    return side.copy() if len(q) >= FREE_JOINTS else None
+    """The finger axis that postures near q are to keep, as far as the arm's joints allow it; None: it has too few."""
+    return side.copy() if len(q) >= TURNED_JOINTS else None
 
 
 def _in_the_way(arm: Arm, grasp: np.ndarray, hover: np.ndarray) -> bool:

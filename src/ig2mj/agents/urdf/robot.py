@@ -55,7 +55,10 @@ SERVO_RATE = 25.0
 """1/s: natural frequency of the critically damped servos of arms."""
 
 ROTOR_SHARE = 0.3
-"""Inertia of motor and gear, as a share of what the joint moves."""
+"""Inertia of motor and gear, as a share of what the joint moves; larger where the servo is stiffer (`GIVES`)."""
+
+GIVES, GIVES_SLIDING = 0.3, 0.05
+"""rad and m by which a joint of an arm gives at most under all its motor's force: light arms hold loads, too."""
 
 SLIP = 0.2
 """Share of a wheel's largest speed that it is behind when its motor pushes with all its force."""
@@ -267,7 +270,7 @@ class UrdfRobot(TaskRobot):
             return
         joint.frictionloss, joint.damping[:] = 0.0, 0.0
         if name in self.layout.arm:
-            joint.armature = ROTOR_SHARE * self.body.moved(name)
+            joint.armature = self._gains(name)[0] / SERVO_RATE**2 - self.body.moved(name)
         elif name in self.layout.gripper:
             joint.armature = max(self._gains(name)[0] / GRIP_RATE**2 - self.body.moved(name), 0.0)
         elif name in self.layout.wheels and self.layout.base != OMNIDIRECTIONAL:
@@ -330,7 +333,9 @@ class UrdfRobot(TaskRobot):
             stiffness = joint.force / (SQUEEZE * (high - low))
             return stiffness, 2 * stiffness / GRIP_RATE
         moved = (1 + ROTOR_SHARE) * self.body.moved(name)
-        return moved * SERVO_RATE**2, 2 * moved * SERVO_RATE
+        gives = GIVES_SLIDING if joint.type == "prismatic" else GIVES
+        stiffness = max(moved * SERVO_RATE**2, joint.force / gives)
+        return stiffness, 2 * stiffness / SERVO_RATE
 
     def hand_rays(self) -> tuple[HandRays, ...]:
         """See `ig2mj.agents.urdf.grip`; in the order of `holding`."""
