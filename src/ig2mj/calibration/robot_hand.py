@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from ig2mj.agents.urdf import UrdfRobot
 from ig2mj.agents.urdf.following import FollowingJoints
-from ig2mj.agents.urdf.grip import jaw_frame
+from ig2mj.agents.urdf.grip import finger_tips, jaw_frame
 from ig2mj.calibration.robot_place import collisions
 from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene
@@ -32,7 +32,8 @@ class Hand:
     Attributes:
       palm: its body. point: where it holds, in its frame. approach, across: unit vectors in its frame: towards what it
         holds, and from one finger to the other. opening: m between the fingers; infinite of suction.
-      joints: of the arm that carries it. close: its action.
+      joints: of the arm that carries it. close: its action. beyond: m by which its fingers, half closed, extend beyond
+        `point` along the approach.
     """
 
     palm: str
@@ -42,6 +43,7 @@ class Hand:
     opening: float
     joints: tuple[str, ...]
     close: str
+    beyond: float = 0.0
 
 
 class Arm:
@@ -155,4 +157,12 @@ def hand_of(robot: UrdfRobot) -> Hand:
         approach = approach / max(float(np.linalg.norm(approach)), 1e-9)
     single = len(layout.grippers) == 1
     close = f"{link}_suction" if suction else "gripper" if single else f"{link}_gripper"
-    return Hand(ray.palm, point, approach, across, opening, joints, close)
+    beyond = 0.0
+    if not suction:
+        gripper = next(one for one in layout.grippers if one.hand == link)
+        half = body.posed({name: sum(body.limits(name)) / 2 for name in layout.gripper})
+        pos, turn = body.pose(palm_link, half)
+        for tip in finger_tips(body, gripper):
+            at, turned = body.pose(tip, half)
+            beyond = max(beyond, float((((at + body.points(tip) @ turned.T - pos) @ turn - point) @ approach).max()))
+    return Hand(ray.palm, point, approach, across, opening, joints, close, beyond)

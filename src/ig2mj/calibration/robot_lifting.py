@@ -50,6 +50,9 @@ SPREAD, TURN = 0.012, math.radians(12)
 ON_POST = 0.25
 """Share of the edge of a post as narrow as the cube, by which the cube may be off its middle: it falls at a half."""
 
+CLEAR_OF_POST = 0.005
+"""m between fingertips and the post."""
+
 HOVER = 0.10
 """m between the gripper and the cube before it approaches."""
 
@@ -151,13 +154,13 @@ def lift(
         simulation.set_object_pose(loose, spot, (math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2)))
         simulation.robots.act(count=3)
         low = float(simulation.object_pose(loose)[0][2])
-        axis = _kept(side, q)
-        grasp, _, _ = arm.solve(q, spot, approach, axis)
-        before, _, _ = arm.solve(grasp, spot - HOVER * approach, approach, axis)
-        raised, _, _ = arm.solve(grasp, spot + RAISE, approach, axis)
+        axis, held = _kept(side, q), spot - _higher(hand, edge, approach) * approach
+        grasp, _, _ = arm.solve(q, held, approach, axis)
+        before, _, _ = arm.solve(grasp, held - HOVER * approach, approach, axis)
+        raised, _, _ = arm.solve(grasp, held + RAISE, approach, axis)
         way, at = [], before
         for left in np.linspace(1, 0, STRAIGHT + 1)[1:]:  # joints that turn evenly would lead the hand along an arc
-            at, _, _ = arm.solve(at, spot - left * HOVER * approach, approach, axis)
+            at, _, _ = arm.solve(at, held - left * HOVER * approach, approach, axis)
             way.append(at)
         move, reason = functools.partial(_move, simulation, hand), ""
         closing = 10 + math.ceil(_closing_time(robot) / ACTION_PERIOD)
@@ -168,18 +171,19 @@ def lift(
                 move(posture, grip, 0)
             move(postures[-1], grip, settle)
             watch(simulation, f"{len(result.lifted)}_{stage}")
-            reason = reason or _fault(stage, simulation, hand, loose, spot)
+            reason = reason or _fault(stage, simulation, hand, loose, spot, held)
         result.lifted.append(float(simulation.object_pose(loose)[0][2]) > low + LIFT)
         result.reasons.append("" if result.lifted[-1] else reason or "the cube slips out of the hand")
     return result
 
 
-def _fault(stage: int, simulation: Simulation, hand: Hand, cube: str, spot: np.ndarray) -> str:
-    """What went wrong in a stage of a try, as far as it can be seen then."""
+def _fault(stage: int, simulation: Simulation, hand: Hand, cube: str, spot: np.ndarray, held: np.ndarray) -> str:
+    """What went wrong in a stage of a try, as far as it can be seen then. spot, held: where the cube lay, and where the
+    hand was to take it."""
     at = simulation.object_pose(cube)[0]
     if stage == 1:
         palm = simulation.data.body(hand.palm)
-        short = float(np.linalg.norm(palm.xpos + palm.xmat.reshape(3, 3) @ hand.point - spot))
+        short = float(np.linalg.norm(palm.xpos + palm.xmat.reshape(3, 3) @ hand.point - held))
         if short > SHORT:
             return f"the hand stops {1000 * short:.0f} mm before the cube"
     if stage in (0, 1) and float(np.linalg.norm((at - spot)[:2])) > PUSHED:
@@ -187,6 +191,12 @@ def _fault(stage: int, simulation: Simulation, hand: Hand, cube: str, spot: np.n
     if stage == 2 and not _touched(simulation, cube):
         return "the fingers close without touching the cube"
     return ""
+
+
+def _higher(hand: Hand, edge: float, approach: np.ndarray) -> float:
+    """m by which a hand stays away from the cube, against its approach, so that its fingers, which are longer than the
+    cube is high, keep clear of the post that it lies on: they hold it nearer to their ends."""
+    return max(hand.beyond + CLEAR_OF_POST - edge / 2, 0.0) if approach[2] < -0.5 else 0.0
 
 
 def _touched(simulation: Simulation, cube: str) -> bool:

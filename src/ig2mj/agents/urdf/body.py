@@ -161,6 +161,17 @@ class RobotBody:
         found = self._data.joint(f"{self.description.name}_{joint}")
         return self._base_turn.T @ (found.xanchor - self._data.body(self._own(self.base)).xpos)
 
+    def lever(self, joint: str) -> float:
+        """m from a joint's axis to the farthest point of what it moves, at joint positions 0."""
+        hub, axis, found = self.hub(joint), self.axis(joint), 0.01
+        for link in self.moved_by([joint]):
+            pos, turn = self.pose(link)
+            if len(points := self.points(link)):
+                away = pos + points @ turn.T - hub
+                away = away - (away @ axis)[:, None] * axis
+                found = max(found, float(np.linalg.norm(away, axis=1).max()))
+        return found
+
     def axis(self, joint: str) -> np.ndarray:
         """Unit vector [3] along a joint's axis, in the base's frame."""
         return self._base_turn.T @ self._data.joint(f"{self.description.name}_{joint}").xaxis

@@ -67,6 +67,10 @@ SQUEEZE, GRIP_RATE = 0.5, 60.0
 """Share of a finger's way by which it is behind when it presses with all its force; 1/s: natural frequency of its
 servo, which a step of 1/120 s must follow."""
 
+MOST_PRESSED = 100.0
+"""N at the end of a finger: a Panda's press with 70 N, a Robotiq 2F-85's with 235 N. Files often give a number that
+stands for any, with which fingers would press what they hold out of the hand."""
+
 WHEEL_RATE = 100.0
 """1/s: how fast a wheel's servo may change its speed, at most."""
 
@@ -282,7 +286,7 @@ class UrdfRobot(TaskRobot):
         if layout.base == OMNIDIRECTIONAL:
             controls += self._add_glide(spec)
         for name in (*(layout.wheels if layout.base != OMNIDIRECTIONAL else ()), *layout.arm, *layout.gripper):
-            servo(spec, f"{self.name}_{name}", *self._gains(name), self.description.joint(name).force)
+            servo(spec, f"{self.name}_{name}", *self._gains(name), self._force(name))
             controls.append(0.0 if name in layout.wheels else self.body.start_of(name, layout))
         for link in layout.suction:
             added = spec.add_actuator(
@@ -323,6 +327,14 @@ class UrdfRobot(TaskRobot):
             added.gear[axis] = 1.0
         return [0.0, 0.0, 0.0]
 
+    def _force(self, name: str) -> float:
+        """N m or N of a joint's motor; fingers press with `MOST_PRESSED` at their ends at most."""
+        joint = self.description.joint(name)
+        if name not in self.layout.gripper:
+            return joint.force
+        lever = self.body.lever(name) if joint.type != "prismatic" else 1.0
+        return min(joint.force, MOST_PRESSED * lever)
+
     def _gains(self, name: str) -> tuple[float, float]:
         """Stiffness and damping of a joint's servo."""
         joint = self.description.joint(name)
@@ -330,7 +342,7 @@ class UrdfRobot(TaskRobot):
             return 0.0, joint.force / (SLIP * joint.speed)
         if name in self.layout.gripper:
             low, high = self.body.limits(name)
-            stiffness = joint.force / (SQUEEZE * (high - low))
+            stiffness = self._force(name) / (SQUEEZE * (high - low))
             return stiffness, 2 * stiffness / GRIP_RATE
         moved = (1 + ROTOR_SHARE) * self.body.moved(name)
         gives = GIVES_SLIDING if joint.type == "prismatic" else GIVES
