@@ -143,5 +143,5 @@ def test_a_link_that_marks_a_point_does_not_collide(tmp_path, mass, size, collid
     robot = UrdfRobot.load(
         converted(tmp_path, *jaw(mark, joint("mark_joint", "fixed", "gripper", "mark", "0.02 0 0.3", "0 0 1")))
     )
-    reaches = float(robot.body.points("gripper")[:, 2].max())
+    reaches = float(robot.body.shapes.points("gripper")[:, 2].max())
     assert (reaches > 0.2) == collides

@@ -7,6 +7,7 @@ import os
 import pathlib
 import subprocess
 import tomllib
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -42,7 +43,7 @@ nothing of them is part of ig2mj.
 |---|---|---|--:|---|--:|--:|---|---|---|
 """
 
-NOTES = "\nWhat does not pass:\n\n"
+NOTES = "\nWhat does not pass, and why some do not lift by friction:\n\n"
 
 COMMIT = "IG2MJ_COMMIT"
 """Environment variable that names the commit of a copy of the files without git."""
@@ -188,13 +189,14 @@ def _tried(entry: dict[str, Any], data: pathlib.Path, cache: pathlib.Path, home:
     from ig2mj.cli.common.trial_props import make_prop
 
     robot = _loaded(entry, data, cache)
-    result = try_robot(robot, make_prop, home, tries, MODES[0])
+    result = physical = try_robot(robot, make_prop, home, tries, MODES[0])
     for mode in MODES[1:]:
         if result.stands and result.lifted and not result.passed:
             result = try_robot(robot, make_prop, home, tries, mode)
+    friction = "" if result is physical else _counted(physical.reasons, len(physical.lifted))
     hands = len(robot.layout.grippers) + len(robot.layout.suction)
     found = {**dataclasses.asdict(result), "passed": result.passed and "refused" not in entry}
-    return {**found, "base": BASE_WORDS[robot.layout.base], "hands": hands}
+    return {**found, "base": BASE_WORDS[robot.layout.base], "hands": hands, "friction": friction}
 
 
 def _commit() -> str:
@@ -242,17 +244,23 @@ def _row(entry: dict[str, Any], found: dict[str, Any]) -> str:
 
 
 def _note(found: dict[str, Any]) -> str:
-    """Why a robot is refused, or does not pass; "" where it passes."""
-    import collections
-
+    """Why a robot is refused, does not pass, or passes with assistance only; "" where it passes by friction."""
     if "refused" in found:
         return found["refused"].removeprefix("layout: base: ").partition(" (base = ")[0]
     if found["passed"]:
-        return ""
-    reasons = collections.Counter(filter(None, found["reasons"]))
+        return f"by friction {friction}" if (friction := found.get("friction")) else ""
     parts = [] if found["stands"] else ["it does not stand"]
     parts += [found["problem"]] if found["problem"] else []
-    return "; ".join([*parts, *(f"{reason} ({count} of {len(found['lifted'])})" for reason, count in reasons.items())])
+    parts += [counted] if (counted := _counted(found["reasons"], len(found["lifted"]))) else []
+    return "; ".join(parts)
+
+
+def _counted(reasons: Sequence[str], tries: int) -> str:
+    """Reasons of failures, each with the number of tries."""
+    import collections
+
+    counts = collections.Counter(filter(None, reasons))
+    return "; ".join(f"{reason} ({count} of {tries})" for reason, count in counts.items())
 
 
 def _origin(found: dict[str, dict[str, Any]]) -> str:

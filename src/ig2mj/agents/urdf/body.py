@@ -166,7 +166,7 @@ class RobotBody:
         hub, axis, found = self.hub(joint), self.axis(joint), 0.01
         for link in self.moved_by([joint]):
             pos, turn = self.pose(link)
-            if len(points := self.points(link)):
+            if len(points := self.shapes.points(link)):
                 away = pos + points @ turn.T - hub
                 away = away - (away @ axis)[:, None] * axis
                 found = max(found, float(np.linalg.norm(away, axis=1).max()))

@@ -243,7 +243,7 @@ def jaw_frame(body: RobotBody, gripper: Gripper) -> JawFrame | None:
     hinge, towards = _axis(turns[0].T @ turns[1]), places[1][0] - places[1][-1]
     if hinge is not None:  # what lies across the jaw does not lead along it
         side = turns[1] @ hinge
-        points = (_to_base(body, tips[0], body.points(tips[0]), data) - pos) @ turn
+        points = (_to_base(body, tips[0], body.shapes.points(tips[0]), data) - pos) @ turn
         spread = points @ side
         point = point + side * ((spread.min() + spread.max()) / 2 - point @ side)
         towards = towards - side * (towards @ side)

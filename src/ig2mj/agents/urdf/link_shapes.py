@@ -121,10 +121,10 @@ class LinkShapes:
     def distance_along(self, link: str, point: np.ndarray, way: np.ndarray, data: Any) -> float | None:
         """m from a point to the link's collision geometry along a unit vector, both in its frame; None: it is not met.
         data: of `posed`."""
-        body = data.body(self._body(link))
+        body = data.body(self._name_of_body(link))
         turn = body.xmat.reshape(3, 3)
         start, along = body.xpos + turn @ point, turn @ way
-        hits = [self._ray(g, start, along, data) for g in self._geoms([link], self._base)]
+        hits = [self._ray(g, start, along, data) for g in self._geoms([link], self.base)]
         return min((at for at in hits if at >= 0), default=None)
 
     def _geoms(self, names: Collection[str], agent: str) -> list[int]:
