@@ -164,5 +164,7 @@ def hand_of(robot: UrdfRobot) -> Hand:
         pos, turn = body.pose(palm_link, half)
         for tip in finger_tips(body, gripper):
             at, turned = body.pose(tip, half)
-            beyond = max(beyond, float((((at + body.shapes.points(tip) @ turned.T - pos) @ turn - point) @ approach).max()))
+            beyond = max(
+                beyond, float((((at + body.shapes.points(tip) @ turned.T - pos) @ turn - point) @ approach).max())
+            )
     return Hand(ray.palm, point, approach, across, opening, joints, close, beyond)

@@ -249,7 +249,9 @@ def jaw_frame(body: RobotBody, gripper: Gripper) -> JawFrame | None:
         towards = towards - side * (towards @ side)
     ahead = _unit(towards - across * (towards @ across))
     data = body.posed({})
-    to_face = [body.shapes.distance_along(hand, point + share * ALONG_FACE * ahead, across, data) for share in (-1.0, 1.0)]
+    to_face = [
+        body.shapes.distance_along(hand, point + share * ALONG_FACE * ahead, across, data) for share in (-1.0, 1.0)
+    ]
     if None not in to_face:
         near, far = to_face
         assert near is not None and far is not None
