@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 from unittest.mock import patch
 
@@ -62,8 +62,8 @@ class RandomPlanner(_Wrapped):
         self.rng = np.random.default_rng(seed)
         self._known: dict[int, tuple[object, int]] = {}
 
-    def plan(self, facts: Facts, failed: Mapping[Any, int] = {}, begun: Any = None) -> TaskPlan:
-        found = self.inner.plan(facts, {}, None)
+    def plan(self, facts: Facts, failed: Any = None, *memory: Any) -> TaskPlan:
+        found = self.inner.plan(facts)
         if found.done:
             return found
         count = self._known.setdefault(id(failed), (failed, len(found.steps)))[1]
@@ -78,8 +78,8 @@ class FirstPlan(_Wrapped):
         super().__init__(planner)
         self._left: dict[int, tuple[object, list[Step]]] = {}
 
-    def plan(self, facts: Facts, failed: Mapping[Any, int] = {}, begun: Any = None) -> TaskPlan:
-        found = self.inner.plan(facts, {}, None)
+    def plan(self, facts: Facts, failed: Any = None, *memory: Any) -> TaskPlan:
+        found = self.inner.plan(facts)
         if id(failed) not in self._left:
             self._left[id(failed)] = failed, list(found.steps)
             return found
