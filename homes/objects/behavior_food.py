@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..shapes import materials
-from ..shapes.bricks import ball, block, box, frustum, prism, rod, soft_box
+from ..shapes.bricks import ball, block, box, frustum, hull, prism, rod, soft_box
 from ..shapes.turned import lathe
 from .entry import Entry
 from .fruit import round_fruit
@@ -147,6 +147,22 @@ def boiled_egg(b: ObjectBuilder) -> None:
     b.add(lathe(profile, 16).at(z=-x / 2).turned("y", 90).at(z=r), organic(b, ("white", (0.86, 0.70, 0.55))))
 
 
+def bivalve(b: ObjectBuilder, *, colours: tuple) -> None:
+    """Two shells, closed, lying flat: a clam, a mussel, an oyster, a scallop."""
+    x, y, z = b.size
+    shell = organic(b, colours)
+    turns = [k * math.pi / 6 for k in range(12)]
+    fan = [(0.5 * x * math.cos(a) + 0.1 * x * (math.cos(a) < 0), 0.5 * y * math.sin(a)) for a in turns]
+    b.add(hull([*((u, v, 0.5 * z) for u, v in fan), *((0.5 * u, 0.5 * v, h) for u, v in fan for h in (0, z))]), shell)
+    dark = materials.plain((0.22, 0.19, 0.17), "organic")
+    b.add(prism([(1.01 * u, 1.01 * v) for u, v in fan], 0.05 * z).visual_only().at(z=0.475 * z), dark)
+
+
+def prawn(b: ObjectBuilder) -> None:
+    """A bent body with a tail, lying on its side."""
+    bent(b, skins=((0.92, 0.62, 0.50), (0.80, 0.72, 0.66)), curve=70.0, tip=None, taper=0.3)
+
+
 def _flesh(rgb: tuple[float, float, float]):
     return lambda rng: materials.plain(materials.tint(rgb, rng), "organic")
 
@@ -161,6 +177,12 @@ CATEGORIES = [
     Entry("leek", leek, (0.380, 0.060, 0.036), 0.20, 2),
     Entry("hard-boiled_egg", boiled_egg, (0.058, 0.044, 0.044), 0.055, 2, uniform=True,
           flesh=_flesh((0.96, 0.78, 0.26))),
+    Entry("clam", bivalve, (0.046, 0.052, 0.024), 0.03, 2,
+          options={"colours": ((0.84, 0.78, 0.68), (0.70, 0.60, 0.50))}),
+    Entry("mussel", bivalve, (0.070, 0.036, 0.024), 0.02, 2, options={"colours": ((0.16, 0.18, 0.26), "black")}),
+    Entry("oyster", bivalve, (0.090, 0.065, 0.028), 0.08, 2, options={"colours": ((0.56, 0.53, 0.48), "grey")}),
+    Entry("scallop", bivalve, (0.080, 0.086, 0.026), 0.06, 2, options={"colours": ((0.92, 0.74, 0.62), "cream")}),
+    Entry("prawn", prawn, (0.080, 0.040, 0.018), 0.02, 2),
     Entry("tortilla", flat_round, (0.200, 0.200, 0.006), 0.05, 2, uniform=True, options={"colours": ((0.93, 0.86, 0.68),
           (0.88, 0.76, 0.50))}),
     Entry("pizza_dough", flat_round, (0.240, 0.240, 0.024), 0.30, 2, uniform=True, options={"colours": ((0.93, 0.88,

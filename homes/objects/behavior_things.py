@@ -192,6 +192,14 @@ def tie(b: ObjectBuilder) -> None:
     b.add(prism(points, z), cloth)
 
 
+def pipe(b: ObjectBuilder) -> None:
+    """A pipe for smoking, lying along x: a stem and a bowl."""
+    x, y, z = b.size
+    wood = look(b, ("walnut", (0.24, 0.30, 0.34)), "wood", 0.6)
+    b.add(rod((-0.3 * x, 0, 0.3 * z), (x / 2, 0, 0.5 * z), 0.2 * y, 8), wood)
+    b.add(lathe([(0.3 * y, 0), (0.5 * y, 0.3 * z), (0.45 * y, z)], 12).at(-x / 2 + 0.5 * y), wood)
+
+
 COINS = {"colours": ("silver", "steel")}
 CATEGORIES = [
     Entry(
@@ -323,4 +331,13 @@ CATEGORIES = [
     Entry("skirt", garment_folded, (0.300, 0.260, 0.040), 0.25, 2),
     Entry("quilt", folded, (0.420, 0.360, 0.140), 1.80, 2, options={"layers": 3}),
     Entry("necktie", tie, (0.720, 0.085, 0.008), 0.07, 2),
+    Entry("pipe", pipe, (0.140, 0.036, 0.046), 0.06, 2),
+    Entry(
+        "place_mat",
+        slab_of,
+        (0.300, 0.400, 0.004),
+        0.08,
+        2,
+        options={"colours": ("teal", "beige"), "kind": "fabric", "accents": ("cream", "rose")},
+    ),
 ]
