@@ -151,7 +151,7 @@ def bivalve(b: ObjectBuilder, *, colours: tuple) -> None:
     """Two shells, closed, lying flat: a clam, a mussel, an oyster, a scallop."""
     x, y, z = b.size
     shell = organic(b, colours)
-    turns = [k * math.pi / 6 for k in range(12)]
+    turns = [k * math.pi / 5 for k in range(10)]
     fan = [(0.5 * x * math.cos(a) + 0.1 * x * (math.cos(a) < 0), 0.5 * y * math.sin(a)) for a in turns]
     b.add(hull([*((u, v, 0.5 * z) for u, v in fan), *((0.5 * u, 0.5 * v, h) for u, v in fan for h in (0, z))]), shell)
     dark = materials.plain((0.22, 0.19, 0.17), "organic")
