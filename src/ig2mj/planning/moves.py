@@ -174,9 +174,11 @@ SEARCHES = 4
 """Ways of a hand that are searched for at most, where via points find none for any pose."""
 
 
-def first_way(candidates: Iterable[Candidate], find: Callable[[Candidate, bool], bool], most: int) -> Candidate | None:
+def first_way(
+    candidates: Iterable[Candidate], find: Callable[[Candidate, bool], bool], most: int, search: bool = True
+) -> Candidate | None:
     """The first of some candidates (stances with poses) with a way for the hand: via points are tried for `most`, then
-    ways are searched for, for the first of them."""
+    ways are searched for, for the first of them, if that is asked for."""
     tried = []
     for candidate in candidates:
         if find(candidate, False):
@@ -184,6 +186,8 @@ def first_way(candidates: Iterable[Candidate], find: Callable[[Candidate, bool],
         tried.append(candidate)
         if len(tried) >= most:
             break
+    if not search:
+        return None
     return next((c for c in tried[:: max(1, len(tried) // SEARCHES)] if find(c, True)), None)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -77,17 +77,9 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 if not again.done:
                     break
             hand = hand_with(world, name)
-            narrowed = bool(step.also)
-            found = _plan(world, predicate, name, where, hand, step.also)
-            if isinstance(found, str) and narrowed:
-                narrowed, found = False, _plan(world, predicate, name, where, hand)
-            if found == _NO_WAY and predicate in FALLS_OVER:
-                found = _plan(world, predicate, name, where, hand, hanging=True)
+            found, also = yield from _find(world, predicate, step, hand, opened)
             if isinstance(found, str):
-                reason = "no_path" if found == _NO_WAY else "no_base"
-                detail = f"{found} {predicate}({name}, {where}) would be true"
-                if predicate == "inside" and (yield from open_into(world, where, opened)):
-                    continue
+                reason, detail = _lacking(found), f"{found} {predicate}({name}, {where}) would be true"
                 if found == _NO_WAY and not turned_over and (yield from _regrasp(world, name, hand)):
                     turned_over = True
                     continue
@@ -131,11 +123,45 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             if not lacking:
                 return Outcome(attempts=attempt + 1)
             reason, detail = "not_true_after", f"{name} was put there, and {lacking[0]} is false"
-            if not narrowed or attempt > 0:
+            if not also or attempt > 0:
                 break
         return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
     return place
+
+
+def _find(
+    world: PlannedWorld, predicate: str, step: Step, hand: int, opened: Tried
+) -> Generator[Program, str, tuple[tuple[Stance, Spot] | str, tuple[Condition, ...]]]:
+    """What `_plan` finds, and the further conditions that are true there: with those of the step, else without; what is
+    in the way of a container is opened before ways are searched for, and at last the object is let go as it hangs."""
+    name, where = step.arguments
+    while True:
+        for also in dict.fromkeys((step.also, ())):
+            spots = _Remembered(spots_for(world, predicate, name, where, also))
+            found = _plan(world, predicate, name, hand, spots)
+            if not isinstance(found, str):
+                return found, also
+        if predicate != "inside" or not (yield from open_into(world, where, opened)) or name not in world.held:
+            break
+    if found == _NO_WAY and name in world.held:
+        found = _plan(world, predicate, name, hand, spots, search=True)
+        if found == _NO_WAY and predicate in FALLS_OVER:
+            found = _plan(world, predicate, name, hand, spots_for(world, predicate, name, where, hanging=True))
+    return found, ()
+
+
+class _Remembered:
+    """Spots that are gone through again without being sampled again."""
+
+    def __init__(self, spots: Iterator[Spot]):
+        self._left, self._known = spots, list[Spot]()
+
+    def __iter__(self) -> Iterator[Spot]:
+        yield from self._known
+        for spot in self._left:
+            self._known.append(spot)
+            yield spot
 
 
 def _regrasp(world: PlannedWorld, name: str, hand: int) -> Generator[Program, str, bool]:
@@ -185,19 +211,18 @@ _NO_SPOT, _NO_STANCE = "there is no room for a place where", "no free floor is i
 _NO_WAY = "the hand has no way to a place where"
 
 
+def _lacking(found: str) -> str:
+    """The reason of a failure whose words these are."""
+    return "no_path" if found == _NO_WAY else "no_base"
+
+
 def _plan(
-    world: PlannedWorld,
-    predicate: str,
-    name: str,
-    where: str,
-    hand: int,
-    also: Sequence[Condition] = (),
-    hanging: bool = False,
+    world: PlannedWorld, predicate: str, name: str, hand: int, proposed: Iterable[Spot], search: bool = False
 ) -> tuple[Stance, Spot] | str:
     """A stance and a pose of the object's main body, of those with a way for the hand; else what is lacking.
 
     Args:
-      also: further placements that are to be true. hanging: see `PlannedWorld.spots`.
+      proposed: spots. search: ways are searched for where via points find none.
     """
     obstacles, floor = world.obstacles([name]), world.floor()
     lacking, seen = _NO_SPOT, list[Stance]()
@@ -207,7 +232,7 @@ def _plan(
         later, and those that are open above, and that the hand cannot be let down to, at last."""
         nonlocal lacking
         later, last = [], []
-        for spot in spots_for(world, predicate, name, where, also, hanging):
+        for spot in proposed:
             target, _, rotation = grip_for(world, hand, name, spot)
             spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
             lacking = _NO_WAY if lacking == _NO_SPOT else lacking
@@ -247,4 +272,4 @@ def _plan(
         return hand_path(standing, spheres, start, goal, back, SPARE, search, follows) is not None
 
     most = WAYS if world.body.opening is None else ARM_WAYS
-    return first_way(candidates(), has_way, most) or lacking
+    return first_way(candidates(), has_way, most, search) or lacking

@@ -33,7 +33,7 @@ ROOFED, COLUMN = 1.0, np.arange(0.15, 0.8, 0.08)
 WIDE = 0.8
 """Share of the middle edge of an object's box that has to have room above a spot."""
 
-LATER_SPOTS = 12
+LATER_SPOTS = 8
 """Candidates of an area of which the predicate is asked, at most."""
 
 TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
@@ -199,11 +199,11 @@ def _would_hold(
     world: PlannedWorld, conditions: Sequence[Condition], name: str, pos: Vector, quat: Float[np.ndarray, "4"]
 ) -> bool:
     """Whether placements that do not depend on contact would be true."""
-    before = world.query.save()
-    world.query.place(world.index(name), pos, quat)
+    index, before = world.index(name), world.pose(name)
+    world.query.place(index, pos, quat)
     states = Facts(world.domain, world.stage.states, world.view, world.world).states
     truth = Facts(world.domain, states, world.query.view).truth([c.atom for c in conditions])
-    world.query.load(before)
+    world.query.place(index, *before)
     return all(truth[c.atom] == c.value for c in conditions)
 
 
