@@ -12,6 +12,8 @@ from ig2mj.agents.kinematics import forward, inverse
 from ig2mj.agents.urdf import UrdfRobot
 from ig2mj.agents.urdf.grip import jaw_frame
 from ig2mj.calibration.robot_hand import Arm, hand_of
+from ig2mj.planning.physics import check_robot
+from ig2mj.planning.steps import PlanningError
 from ig2mj.scene.scene import load_scene
 
 LIFT = '<limit lower="0" upper="0.5" effort="200" velocity="0.5"/>'
@@ -145,3 +147,11 @@ def test_a_link_that_marks_a_point_does_not_collide(tmp_path, mass, size, collid
     )
     reaches = float(robot.body.shapes.points("gripper")[:, 2].max())
     assert (reaches > 0.2) == collides
+
+
+def test_what_a_robot_lacks_for_primitives_is_named(reaching, tmp_path):
+    turning = joint("turn", "revolute", "base", "tool", "0 0 0.2", "0 0 1", TURN)
+    bare = UrdfRobot.load(converted(tmp_path, link("tool"), turning))
+    for robot, lacks in ((reaching, "has no base that moves"), (bare, "has no hand that holds something")):
+        with pytest.raises(PlanningError, match=lacks):
+            check_robot(robot)

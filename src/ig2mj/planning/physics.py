@@ -37,9 +37,10 @@ MOST_STEPS = 3000
 def check_robot(robot: str | TaskRobot) -> None:
     """Raises PlanningError: motion of the hands of a robot cannot be planned."""
     name, body = find_robot(robot)
-    if not isinstance(body, Humanoid) and not (body.drives and body.hand_count == 1):
+    hands = body.hand_count if body.hand_rays() else 0
+    if not isinstance(body, Humanoid) and not (body.drives and hands == 1):
         several = "has several arms" if body.drives else "has no base that moves"
-        lacks = several if body.hand_count else "has no hand"
+        lacks = several if hands else "has no hand that holds something" if body.hand_count else "has no hand"
         raise PlanningError(f"motion of the hands of robot '{name}', which {lacks}, cannot be planned (take humanoid)")
 
 
