@@ -1,0 +1,62 @@
+"""Where a way begins, and from which height an object is dropped, where there is little room."""
+
+import numpy as np
+import pytest
+
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.free_floor import POCKET, FreeFloor
+from ig2mj.planning.occupancy import RESOLUTION, Occupancy
+from ig2mj.planning.placing import DEEP_DROPS, _drop
+
+
+class _Cells(Occupancy):
+    """Cells of a floor that begins at the origin."""
+
+    def __init__(self, still):
+        self._still, self.origin, self.shape = still, np.zeros(2), still.shape
+
+    def cells(self, xy):
+        return np.floor(np.asarray(xy, float)[..., ::-1] / RESOLUTION).astype(int)
+
+    def middles(self, cells):
+        return (np.asarray(cells)[..., ::-1] + 0.5) * RESOLUTION
+
+    def still(self, low, high):
+        return self._still
+
+
+def floor_with_pocket(still=False):
+    """4 m by 4 m of free floor, but for a frame 3 cells thick around 25 cells; `still`: the frame cannot move."""
+    free = np.ones((80, 80), bool)
+    free[37:48, 37:48] = False
+    frame = ~free
+    free[40:45, 40:45] = True
+    return FreeFloor(_Cells(frame if still else np.zeros_like(free)), free, np.where(free, 0.1, -0.1))
+
+
+@pytest.mark.parametrize("still", [False, True])
+def test_a_way_begins_outside_of_a_pocket_unless_furniture_shuts_it_off(still):
+    floor, robot = floor_with_pocket(still), (42.5 * RESOLUTION, 42.5 * RESOLUTION)
+    assert floor.free[40:45, 40:45].sum() < POCKET
+    begin = floor.begin(robot, 0.5)
+    assert (begin >= 40).all() and (begin < 45).all() if still else floor._sizes[floor._labels[tuple(begin)]] > POCKET
+    assert np.isfinite(floor.distances(robot, 0.5)).sum() == (25 if still else floor.free.sum() - 25)
+
+
+class _Bucket(Obstacles):
+    """A bucket with its bottom at 0 whose rim, 0.25 m high, leaves room for spheres up to 0.1 m from its axis."""
+
+    def __init__(self):
+        pass
+
+    def clear(self, spheres):
+        across = np.hypot(spheres[:, 0], spheres[:, 1]) + spheres[:, 3]
+        return not ((spheres[:, 2] < 0.25) & (across > 0.1)).any()
+
+
+def test_an_object_falls_from_the_lowest_height_at_which_the_hand_has_room():
+    hand, held = [0.12, 0.0, 0.06, 0.03], [0.0, 0.0, 0.0, 0.012]
+    goal = np.array([0.0, 0.0, 0.05])
+    assert _drop(_Bucket(), np.array([held]), goal, DEEP_DROPS) == 0.0
+    assert _drop(_Bucket(), np.array([hand, held]), goal, DEEP_DROPS) == 0.16
+    assert _drop(_Bucket(), np.array([hand, held]), goal, (0.0, 0.05)) is None
