@@ -16,7 +16,8 @@ from ig2mj.states.relations.rooms import rooms_of
 
 
 class SomebodyElse:
-    """Puts an object onto the floor of the room where it is, or of another one, after half of the first plan's steps.
+    """Puts an object onto the floor of the room where it is, or of another one: before the step in the middle of the
+    first plan, or before the first later one at which an object that is still needed is in no hand.
 
     Attributes:
       moved: name of the object; "": none yet.
@@ -30,7 +31,7 @@ class SomebodyElse:
     def see(self, plan: TaskPlan, records: Sequence[StepRecord]) -> str:
         """Looks at a new plan; what is done, in words, "" for nothing."""
         self._first = self._first or len(plan.steps)
-        if self.moved or 2 * len(records) < self._first or not plan.steps:
+        if self.moved or 2 * (len(records) + 1) < self._first or not plan.steps:
             return ""
         world = self._rung.world(0)
         domain, held = world.domain, world.held

@@ -100,7 +100,7 @@ def solve_starts(problem: Problem, args: argparse.Namespace) -> None:
     """Solves the starts one after another. An error of one is its result."""
     planner = TaskPlanner(Domain(problem.model, make_robot(args.robot).hand_count), problem.goal)
     planner = planner_of(args.agent, planner, problem, args.seed)
-    left = list(args.starts)
+    left, args.moved_objects = list(args.starts), {}
     while left:
         began = time.process_time()
         try:
@@ -108,7 +108,10 @@ def solve_starts(problem: Problem, args: argparse.Namespace) -> None:
                 for number, result in episodes(problem, planner, tuple(left), args):
                     left.remove(number)
                     spent = round(time.process_time() - began, 2)
-                    report(event="row", start=number, home=problem.scene.name, processor=spent, result=row_of(result))
+                    row = row_of(result) | (
+                        {"moved": args.moved_objects.get(number, "")} if args.moved == "once" else {}
+                    )
+                    report(event="row", start=number, home=problem.scene.name, processor=spent, result=row)
                     began = time.process_time()
             return  # starts that are left have no row of the pool
         except (Exception, MemoryError) as e:
@@ -129,6 +132,7 @@ def episodes(
         report(event="step", start=at, step=str(plan.steps[0]) if plan.steps else "")
         if somebody is not None and (moved := somebody.see(plan, records)):
             report(event="step", start=at, step=moved)
+            args.moved_objects[at] = somebody.moved
 
     if args.rung == "symbolic":
         pool = problem.pool(args.split, max(args.count, max(numbers) + 1))
