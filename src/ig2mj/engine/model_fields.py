@@ -40,6 +40,8 @@ class ModelFields:
       geom_friction: sliding, torsional, rolling. dof_damping: N s/m or N m s/rad.
       geom_rgba, mat_rgba: colours, 0..1; seen where MuJoCo draws (`Engine.to_mujoco`) and by cameras.
       geom_matid: material of each geom, -1 for none; likewise.
+      body_pos, body_quat: poses of bodies in their parents' frames (m, w-x-y-z); of a body without joints that hangs on
+        the world, where it stands.
       cam_pos, cam_quat: poses of cameras in their bodies' frames (m, w-x-y-z).
     """
 
@@ -57,6 +59,8 @@ class ModelFields:
     geom_matid: Int[Array, "*W G"] | None = None
     cam_pos: Float[Array, "*W C 3"] | None = None
     cam_quat: Float[Array, "*W C 4"] | None = None
+    body_pos: Float[Array, "*W B 3"] | None = None
+    body_quat: Float[Array, "*W B 4"] | None = None
 
 
 NAMES: tuple[str, ...] = tuple(field.name for field in dataclasses.fields(ModelFields))
@@ -65,7 +69,10 @@ NAMES: tuple[str, ...] = tuple(field.name for field in dataclasses.fields(ModelF
 MASSES = ("body_mass", "body_inertia", "body_subtreemass", "body_invweight0", "dof_invweight0", "dof_M0")
 """Fields that belong together: an engine has all of them or none, and they are written together."""
 
-MOVING = ("eq_data", *MASSES, "geom_friction", "dof_damping")
+POSES = ("body_pos", "body_quat")
+"""Fields of where bodies hang on their parents."""
+
+MOVING = ("eq_data", *MASSES, "geom_friction", "dof_damping", *POSES)
 """Fields that a physics step reads."""
 
 

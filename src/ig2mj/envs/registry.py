@@ -31,7 +31,16 @@ from ig2mj.envs.names import NAMES, activity_name, short_name, unknown_environme
 from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, EnvSetup, setup_activity, setup_bddl, setup_navigation
 from ig2mj.envs.several_homes import HomesEnvironment, requested_homes
-from ig2mj.envs.start_choices import DOORS, augmented, named_objects, start_part, varied_models, with_open_doors
+from ig2mj.envs.start_choices import (
+    DOORS,
+    augmented,
+    moving_fields,
+    named_objects,
+    start_part,
+    varied_models,
+    varied_poses,
+    with_open_doors,
+)
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point
 from ig2mj.sensors.registry import SENSORS
@@ -297,16 +306,25 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     rows = starts.size
     if config.augment_starts and isinstance(task, Task):
         starts = augmented(task, setup, starts, config.augment_starts)
-    if config.doors == "open":
-        starts = with_open_doors(scene, starts, named_objects(task))
-    options = config.engine_options
+    options, poses = config.engine_options, None
     if differs is not None:
-        options = {**options, "model_fields": (*options.get("model_fields", ()), *differs.model_fields)}
+        poses = varied_poses(task, setup, differs, split)
+        own = (*differs.model_fields, *moving_fields(task, setup, differs))
+        options = {**options, "model_fields": (*options.get("model_fields", ()), *own)}
+    if config.doors == "open":
+        starts, poses = (
+            None if pool is None else with_open_doors(scene, pool, named_objects(task)) for pool in (starts, poses)
+        )
     physics = make_engine(engine, scene, config.worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
     every_number = whole or isinstance(task, BddlTask)  # of the action; some ask hands back
     core = Core(
-        physics, rules, starts, controllers, hands, hand_resets=every_number, randomize=differs, swaps=setup.swaps
+        *(physics, rules, starts, controllers, hands),
+        hand_resets=every_number,
+        randomize=differs,
+        swaps=setup.swaps,
+        poses=poses,
+        about=task.objects_of_interest if isinstance(task, Task) else (),
     )
     varied = () if differs is None else differs.axes
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], known, settings, varied=varied)

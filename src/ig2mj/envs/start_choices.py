@@ -1,4 +1,4 @@
-"""What start states of an environment are taken from: parts of a split, other models, augmented rows, open doors."""
+"""What start states of an environment are taken from: parts of a split, other models and poses, augmented rows, doors."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Collection
 
 import numpy as np
 
+from ig2mj.engine.model_fields import POSES
 from ig2mj.engine.snapshot import FULLY_AWAKE
 from ig2mj.envs.setups import EnvSetup
 from ig2mj.errors import EngineError
@@ -15,11 +16,14 @@ from ig2mj.scene.scene import Scene
 from ig2mj.tasks.bddl.task import BddlTask
 from ig2mj.tasks.homes import AnyTask
 from ig2mj.tasks.mixing import mixed_pool
-from ig2mj.tasks.model_choices import ModelChoices, choices_of
+from ig2mj.tasks.model_choices import ModelChoices, choices_of, widened
+from ig2mj.tasks.object_poses import spread_starts
+from ig2mj.tasks.pools import bare_scene
 from ig2mj.tasks.splits import Split
 from ig2mj.tasks.task import Task
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.randomize import Randomize
+from ig2mj.worlds.robot_starts import is_pinned
 
 
 def augmented(task: Task, setup: EnvSetup, starts: Pool, count: int) -> Pool:
@@ -72,3 +76,29 @@ def varied_models(task: AnyTask, randomize: Randomize, split: str) -> ModelChoic
     if not isinstance(task, Task) or task.code is not None:
         raise EngineError(f"randomize: objects of {task.name}: only the paper's activities have several models")
     return choices_of(task, Split.of(split).models, varied.count)
+
+
+def varied_poses(task: AnyTask, setup: EnvSetup, randomize: Randomize, split: str) -> Pool | None:
+    """Start states with the task's objects elsewhere; None: they are where they usually are. `split`: as `start_part`.
+
+    Raises EngineError: they cannot be sampled.
+    """
+    varied = randomize.settings("object_poses")
+    if varied is None:
+        return None
+    if not isinstance(task, Task) or task.code is not None:
+        raise EngineError(f"randomize: object_poses of {task.name}: only start states of the paper's activities differ")
+    found = spread_starts(task, split, varied.count)
+    return found if setup.swaps is None else widened(found, bare_scene(task), setup.scene)
+
+
+def moving_fields(task: AnyTask, setup: EnvSetup, randomize: Randomize) -> tuple[str, ...]:
+    """Fields of the model by which the robot starts elsewhere. Raises EngineError: it cannot."""
+    if randomize.settings("robot_start") is None:
+        return ()
+    if not isinstance(task, Task) or task.code is not None:
+        raise EngineError(
+            f"randomize: robot_start of {task.name}: only robots of the paper's activities start elsewhere (leave the "
+            "axis out)"
+        )
+    return POSES if is_pinned(setup.scene) else ()

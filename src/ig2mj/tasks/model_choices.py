@@ -88,11 +88,13 @@ def choices_of(task: Task, part: str, count: int) -> ModelChoices:
             roles = {own: None}
     if not roles:
         raise EngineError(f"{task.name}: none of its objects has other models (randomize: objects)")
+    other_use = _of_the_other_grasping(task)
     found = dict[str, list[tuple[str, str]]]()
     added: list[Any] = []
     for role, model in roles.items():
         category = role.rsplit("_", 1)[0] if model is None else model.category
         pool, joined = models_with_parts(category)
+        pool = [name for name in pool if name in joined or f"{category}/{name}" not in other_use]
         own = None if model is None else model.model
         for name in _most(models_of(pool, part, joined), joined, count):
             if name == own:
@@ -104,7 +106,7 @@ def choices_of(task: Task, part: str, count: int) -> ModelChoices:
     options = {role: [(name or next(fresh), model) for name, model in every] for role, every in found.items()}
     most = max(map(len, options.values()))
     sets = [[options[role][k % len(options[role])] for role in roles] for k in range(most)]
-    tasks = tuple(with_names(task, {role: name for role, (name, _) in zip(roles, one, strict=True)}) for one in sets)
+    tasks = tuple(_renamed(task, {role: name for role, (name, _) in zip(roles, one, strict=True)}) for one in sets)
     whole = dataclasses.replace(
         task, objects=(*task.objects, *added), goal=_any_of(task.goal, [t.goal for t in tasks], roles)
     )
@@ -123,6 +125,20 @@ def _renamed(task: Task, names: Mapping[str, str]) -> Task:
     at_home = {here: name for name, here in task.roles.items()}
     own = {at_home.get(role, role): name for role, name in names.items()}
     return dataclasses.replace(with_names(task, names), roles={**task.roles, **own})
+
+
+def _of_the_other_grasping(task: Task) -> set[str]:
+    """Models that lie or stand as only the other kind of grasping takes them, such as knives on their handles."""
+    if task.physical is None:
+        return set()
+    friction = {text for texts in task.physical.objects for text in texts}
+    by_friction = set(map(str, task.objects)) <= friction
+    found = set[str]()
+    for category in {text.partition("/")[0] for text in friction}:
+        models = [f"{category}/{name}" for name in library().get(category, ())]
+        if models and models[0] not in friction:  # it has models of its own for friction
+            found |= {name for name in models if (name in friction) != by_friction}
+    return found
 
 
 def _most(models: list[str], joined: Mapping[str, str], count: int) -> list[str]:

@@ -89,6 +89,8 @@ class Core:
         hand_resets: bool = False,
         randomize: Randomize | None = None,
         swaps: ModelSwaps | None = None,
+        poses: Pool | None = None,
+        about: Sequence[str] = (),
     ):
         """Binds an engine to the rules of its scene.
 
@@ -101,7 +103,8 @@ class Core:
           hand_resets: hands that an action asks back are teleported where they are out of reach; makes compiled
             programs larger.
           randomize: what differs between episodes; the engine must have its `model_fields`.
-          swaps: objects whose models do.
+          swaps: objects whose models do. poses: start states in place of the pool's where `object_poses` differ.
+          about: objects that must be within reach where `robot_start` differs.
         """
         self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
         self.grasping, self.hands = (
@@ -111,7 +114,7 @@ class Core:
         self.cameras = AgentCameras(engine, self.controllers)
         self.hand_resets = HandResets(engine, self.controllers, hand_resets)
         self.controls = Controls(engine, self.controllers)
-        self.starts = Starts(engine, rules.initial if rules is not None else None, pool, randomize, swaps)
+        self.starts = Starts(engine, rules.initial if rules is not None else None, pool, randomize, swaps, poses, about)
         self.physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
         self._count = guards.counter(engine, lambda: self.starts.floor, engine.substeps * engine.timestep)
         self._select = engine.compile(select_worlds)

@@ -24,8 +24,8 @@ class Draw:
     """Of every world; None: the axis is off.
 
     Attributes:
-      models: which model each varying object has, numbers in `Randomization.models`.
-      object_poses: number of the arrangement, 0: as in the row of the pool.
+      models: which object has each part that varies, numbers in the scene.
+      object_poses: row of the start states that `tasks.object_poses` made.
       robot_start: x and y (m) and yaw (rad) by which the robot starts elsewhere, in the frame of its usual start.
       camera_pos, camera_quat: by which the robot's cameras are displaced, m and w-x-y-z, in each camera's own frame
         (x right, y up, -z forward).

@@ -22,12 +22,16 @@ from ig2mj.engine.layout import make_layout
 from ig2mj.engine.snapshot import FULLY_AWAKE
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import quat_to_matrix
+from ig2mj.scene.additions import HEIGHT
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.pool import Pool
-from ig2mj.worlds.randomization import stream
+from ig2mj.worlds.randomization import pick
 
 CLEAR = 0.001
 """m above its support at which another model is put down."""
+
+WAITING = HEIGHT + 2.0
+"""m: objects whose origin is lower wait on the slab."""
 
 DEEP = 0.004
 """m: a model that reaches deeper into something than this does not fit into a row."""
@@ -51,11 +55,12 @@ class ModelSwaps:
         self._half, self._centre = 0.5 * tables.object_bbox, tables.object_bbox_center
         self._away = np.asarray(scene.start_data().qpos, np.float32)
         self._root = tables.object_root
+        whole = np.where(tables.object_part_of >= 0, tables.object_part_of, np.arange(len(tables.object_names)))
+        self._parts = (whole == self._other[..., None]).astype(np.float32)  # [K, R, O]
 
     def draw(self, key: UInt[Array, "W 2"]) -> Int[Array, "W"]:
         """The choice of worlds whose episodes have these keys."""
-        count = len(self.names)
-        return jax.vmap(lambda k: jax.random.randint(k, (), 0, count))(stream(key, "models")).astype(jnp.int32)
+        return pick(key, "models", len(self.names))
 
     def fitted(self, choice: Int[Array, "W"], row: Int[Array, "W"], fits: Bool[np.ndarray, "P K"]) -> Int[Array, "W"]:
         """The first choice from the drawn one on that fits into each row; the drawn one where none does."""
@@ -103,12 +108,18 @@ class ModelSwaps:
         """Objects that have the roles."""
         return jnp.asarray(self._other, jnp.int32)[choice]
 
+    def lowest(self, floor: Float[np.ndarray, "O"]) -> Float[np.ndarray, "O"]:
+        """Heights below which objects have left the house, where those of a role wait in each other's places."""
+        floor = np.array(floor)
+        for r, base in enumerate(self._base):
+            group = np.unique([base, *self._other[:, r]])
+            floor[group] = floor[group].min()
+        return floor
+
     def active(self, object_pos: Float[Array, "W O 3"]) -> Int[Array, "W"]:
-        """The choice whose objects are farthest from where they wait: it is in use."""
-        first = self._other[:, 0]
-        waits = np.stack([self._away[self._columns(int(o))][:3] for o in first])
-        apart = jnp.sum(jnp.square(jnp.asarray(object_pos)[:, first] - waits), axis=-1)
-        return jnp.argmax(apart, axis=1)
+        """The choice that most objects in the house belong to; halves count as their whole."""
+        there = jnp.asarray(object_pos)[..., 2] > WAITING
+        return jnp.argmax(jnp.sum(jnp.einsum("wo,kro->wkr", there, self._parts) > 0, axis=-1), axis=1)
 
     def fits(self, pool: Pool) -> Bool[np.ndarray, "P K"]:
         """Whether the objects of each choice go into each row without reaching into anything. On the host."""

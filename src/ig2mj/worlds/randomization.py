@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from jaxtyping import Float, UInt
+from jaxtyping import Float, Int, UInt
 
 from ig2mj.engine.model_fields import MASSES, ModelFields, with_masses
 from ig2mj.engine.view import Array
@@ -198,6 +198,11 @@ def uniform(
 ) -> Float[Array, "W ..."]:
     """Numbers [W, *shape] between two, all equally likely."""
     return jax.vmap(lambda one: jax.random.uniform(one, shape, minval=low, maxval=high))(stream(key, name))
+
+
+def pick(key: UInt[Array, "W 2"], name: str, count: int) -> Int[Array, "W"]:
+    """Whole numbers below `count`, all equally likely."""
+    return jax.vmap(lambda one: jax.random.randint(one, (), 0, count))(stream(key, name)).astype(jnp.int32)
 
 
 def factors(key: UInt[Array, "W 2"], name: str, between: Range, shape: tuple[int, ...]) -> Float[Array, "W ..."]:

@@ -53,14 +53,13 @@ class Objects(_Axis):
 
 @dataclasses.dataclass(frozen=True)
 class ObjectPoses(_Axis):
-    """Poses of loose objects on what they stand on.
+    """Where a task's objects start: start states that the sampler draws on other supports within reach, too.
 
     Attributes:
-      shift: m, largest displacement. turn: degrees, largest turn about the vertical.
+      count: start states of all supports together; each is sampled once and kept in the cache.
     """
 
-    shift: float = 0.05
-    turn: float = 180.0
+    count: int = 64
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,14 +125,14 @@ class Physics(_Axis):
 
 @dataclasses.dataclass(frozen=True)
 class RobotStart(_Axis):
-    """Pose of the robot's base at the start of episodes.
+    """Pose of the robot's base at the start of episodes: free of collisions, and with the task's objects within reach.
 
     Attributes:
       shift: m, largest displacement. turn: degrees, largest turn about the vertical.
     """
 
-    shift: float = 0.05
-    turn: float = 5.0
+    shift: float = 0.1
+    turn: float = 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -168,7 +167,7 @@ AXES: dict[str, type[_Axis]] = {
 }
 """Settings of each axis, in the order of `Randomize`."""
 
-UNFINISHED: frozenset[str] = frozenset({"objects", "object_poses", "robot_start"})
+UNFINISHED: frozenset[str] = frozenset()
 """Axes that environments refuse."""
 
 
@@ -179,7 +178,7 @@ class Randomize:
 
     Attributes:
       objects: models of the task's objects, of the same category.
-      object_poses: poses of loose objects.
+      object_poses: where the task's objects start.
       materials: colours and textures.
       lights: number, direction, intensity and colour of lights.
       camera: pose and field of view of the robot's cameras.

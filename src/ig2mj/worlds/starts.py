@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from flax import struct
 from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.engine.base import Engine
@@ -25,8 +27,22 @@ from ig2mj.worlds.model_swaps import ModelSwaps
 from ig2mj.worlds.plugin_states import completed
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds, episode_keys, pick_rows
-from ig2mj.worlds.randomization import Randomization
+from ig2mj.worlds.randomization import Randomization, pick
 from ig2mj.worlds.randomize import Randomize
+from ig2mj.worlds.robot_starts import RobotStarts
+
+
+@struct.dataclass
+class Choices:
+    """What is chosen from tables of a scene, of every world; None: the axis is off.
+
+    Attributes:
+      object_poses: row of the start states that differ in poses. models: number of the choice. robot_start: of the pose.
+    """
+
+    object_poses: Int[Array, "W"] | None = None
+    models: Int[Array, "W"] | None = None
+    robot_start: Int[Array, "W"] | None = None
 
 
 class Starts:
@@ -39,9 +55,12 @@ class Starts:
         pool: Pool | None,
         randomize: Randomize | None = None,
         swaps: ModelSwaps | None = None,
+        poses: Pool | None = None,
+        about: Sequence[str] = (),
     ):
         """`initial`: states of one world, for where no pool is given: then all start where the engine's reset does.
-        `randomize`: what differs between episodes. `swaps`: objects whose models do.
+        `randomize`: what differs between episodes. `swaps`: objects whose models do. `poses`: start states in place of
+        the pool's where `object_poses` differ. `about`: objects that must be within reach where `robot_start` does.
 
         Raises EngineError: the pool is of another scene, of other added objects, or of the scene before it was changed.
         """
@@ -54,7 +73,7 @@ class Starts:
             )
         self._engine, self._initial, self._given = engine, initial, pool
         self._draw = engine.compile(self._draw_fn)
-        self._randomize, self._swaps = randomize, swaps
+        self._randomize, self._swaps, self._poses, self._about = randomize, swaps, poses, tuple(about)
         self._fields = engine.compile(lambda key: (self.randomization.fields(key), self.randomization.draw(key)))
 
     @functools.cached_property
@@ -63,7 +82,15 @@ class Starts:
         pool = self._given
         if pool is None:
             pool = Pool(physics=jax.tree.map(lambda a: a[None], self._scene[0]), states=self._initial)
-        elif self._initial is not None:
+        return self._loadable(pool)
+
+    @functools.cached_property
+    def poses(self) -> Pool | None:
+        """What episodes start from where `object_poses` differ."""
+        return None if self._poses is None else self._loadable(self._poses)
+
+    def _loadable(self, pool: Pool) -> Pool:
+        if self._given is not None and self._initial is not None:
             pool = dataclasses.replace(pool, states=completed(pool.states, self._initial))
         return self._engine.constants(pool)
 
@@ -73,23 +100,73 @@ class Starts:
         assert self._randomize is not None
         return Randomization(self._randomize, self._engine.scene.model, self._engine.tables)
 
+    @functools.cached_property
+    def robot_starts(self) -> RobotStarts | None:
+        """Poses of the robot; None: it has one. Raises EngineError: there is no room for others."""
+        settings = None if self._randomize is None else self._randomize.settings("robot_start")
+        if settings is None:
+            return None
+        return RobotStarts(self._engine.scene, self._about, settings, self._scene[0].agents)
+
     def rows(self, row: Int[Array, "W"], key: UInt[Array, "W 2"]) -> tuple[Pool, Draw]:
         """Rows of the pool, with the fields of the model that episodes with these keys have; and what else is drawn."""
-        rows, draw = self.drawn(self.bare_rows(row), key)
-        if self._swaps is None:
-            return rows, draw
-        choice = self._swaps.fitted(self._swaps.draw(key), row, self._fits)
-        return self._swaps.swapped(rows, choice), dataclasses.replace(draw, models=self._swaps.models(choice))
+        if self._randomize is None:
+            return self.bare_rows(row), Draw()
+        return self.chosen(row, key, self.choices(row, key))
+
+    def choices(self, row: Int[Array, "W"], key: UInt[Array, "W 2"]) -> Choices:
+        """What episodes with these keys choose from tables, for rows of the pool."""
+        poses = models = robot = None
+        if self.poses is not None:
+            row = poses = pick(key, "object_poses", self.poses.size)
+        if self._swaps is not None:
+            models = self._swaps.fitted(self._swaps.draw(key), row, self._fits)
+        if self.robot_starts is not None:
+            robot = self.robot_starts.fitted(self.robot_starts.draw(key), row, self._reach)
+        return Choices(poses, models, robot)
+
+    def chosen(self, row: Int[Array, "W"], key: UInt[Array, "W 2"], choices: Choices) -> tuple[Pool, Draw]:
+        """`rows` with other choices than the keys'."""
+        poses, models, robot = choices.object_poses, choices.models, choices.robot_start
+        rows = self.bare_rows(row) if poses is None else self._bare(self.poses, poses)
+        rows, draw = self.drawn(rows, key)
+        if poses is not None:
+            draw = dataclasses.replace(draw, object_poses=poses)
+        if models is not None:
+            assert self._swaps is not None
+            rows = self._swaps.swapped(rows, models)
+            draw = dataclasses.replace(draw, models=self._swaps.models(models))
+        if robot is not None:
+            assert self.robot_starts is not None
+            rows = self.robot_starts.moved(rows, robot)
+            draw = dataclasses.replace(draw, robot_start=jnp.asarray(self.robot_starts.offsets)[robot])
+        return rows, draw
 
     @functools.cached_property
     def _fits(self) -> Bool[np.ndarray, "P K"]:
         """Which models fit into which rows."""
         assert self._swaps is not None
-        return self._swaps.fits(self._given if self._given is not None else self.pool)
+        return self._swaps.fits(self._table)
+
+    @functools.cached_property
+    def _reach(self) -> Bool[np.ndarray, "P K"]:
+        """From which poses of the robot the objects of which rows are within reach."""
+        assert self.robot_starts is not None
+        with jax.ensure_compile_time_eval():
+            return self.robot_starts.reach(self._table)
+
+    @property
+    def _table(self) -> Pool:
+        """Rows that episodes start from, on the host."""
+        return next(pool for pool in (self._poses, self._given, self.pool) if pool is not None)
 
     def bare_rows(self, row: Int[Array, "W"]) -> Pool:
         """Rows of the pool without fields of the model where episodes draw them."""
-        rows = self.pool.rows(row)
+        return self._bare(self.pool, row)
+
+    def _bare(self, pool: Pool | None, row: Int[Array, "W"]) -> Pool:
+        assert pool is not None
+        rows = pool.rows(row)
         if self._randomize is None:
             return rows
         return dataclasses.replace(rows, physics=dataclasses.replace(rows.physics, model_fields=ModelFields()))
@@ -99,8 +176,7 @@ class Starts:
         if self._randomize is None:
             return rows, Draw()
         fields, draw = self._fields(key)
-        if self._swaps is not None:  # rows from elsewhere have the first choice, unless their draw says otherwise
-            draw = dataclasses.replace(draw, models=self._swaps.models(jnp.zeros(key.shape[0], jnp.int32)))
+        draw = self._usual(draw, key.shape[0])  # of rows from elsewhere, unless their draw says otherwise
         fields = merged(fields, rows.physics.model_fields)
         return dataclasses.replace(rows, physics=dataclasses.replace(rows.physics, model_fields=fields)), draw
 
@@ -108,15 +184,24 @@ class Starts:
         """As `rows` gives it, before any episode."""
         if self._randomize is None:
             return Draw()
-        draw = self._fields(jnp.zeros((worlds, 2), jnp.uint32))[1]
-        if self._swaps is None:
-            return draw
-        return dataclasses.replace(draw, models=self._swaps.models(jnp.zeros(worlds, jnp.int32)))
+        return self._usual(self._fields(jnp.zeros((worlds, 2), jnp.uint32))[1], worlds)
+
+    def _usual(self, draw: Draw, worlds: int) -> Draw:
+        """With the first choice of everything that is chosen from tables."""
+        zero = jnp.zeros(worlds, jnp.int32)
+        if self._swaps is not None:
+            draw = dataclasses.replace(draw, models=self._swaps.models(zero))
+        if self._poses is not None:
+            draw = dataclasses.replace(draw, object_poses=zero)
+        if self.robot_starts is not None:
+            draw = dataclasses.replace(draw, robot_start=jnp.zeros((worlds, 3), jnp.float32))
+        return draw
 
     @functools.cached_property
     def floor(self) -> Float[np.ndarray, "O"]:
         """Metres: the height below which each object has left the house."""
-        return guards.lowest_support(self._scene[1], self._engine.tables.object_fixed)
+        floor = guards.lowest_support(self._scene[1], self._engine.tables.object_fixed)
+        return floor if self._swaps is None else self._swaps.lowest(floor)
 
     @functools.cached_property
     def _scene(self) -> tuple[Snapshot, PhysicsView]:

@@ -29,7 +29,7 @@ from ig2mj.engine.mjx.execution import TracedExecution
 from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, fresh, mujoco_of, uncommitted
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import after_release, apply_write, reaches, trees_joined, with_islands
-from ig2mj.engine.model_fields import MOVING, ModelFields, check_written, given, merged, own_fields
+from ig2mj.engine.model_fields import MOVING, POSES, ModelFields, check_written, given, merged, own_fields
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE
 from ig2mj.engine.scene_engine import SceneEngine
@@ -167,7 +167,8 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
             carry, _ = jax.lax.scan(substep, carry, length=self.substeps)
         data, (link_force, finger_force), overflow, awake = carry
         touching = self._touching(data, physics.touching, awake)
-        data = self._placed(data.replace(qvel=self._speed_limits.limited(data.qvel)))
+        data = data.replace(qvel=self._speed_limits.limited(data.qvel))
+        data = self._placed(data, _poses(physics.fields))
         physics = dataclasses.replace(
             physics,
             data=data,
@@ -282,10 +283,11 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
         data = data.replace(**fields, time=put(snapshot.time, data.time))
         asleep = put(snapshot.tree_asleep, self._tree_asleep(data))
         data = self._replaced(self._with_sleep(data, asleep, asleep < 0), chosen)
+        own = jax.tree.map(put, merged(snapshot.model_fields, ModelFields(snapshot.eq_data)), physics.fields)
         return dataclasses.replace(
             physics,
-            data=self._placed(data),
-            fields=jax.tree.map(put, merged(snapshot.model_fields, ModelFields(snapshot.eq_data)), physics.fields),
+            data=self._placed(data, _poses(own)),
+            fields=own,
             ignored=put(snapshot.agents.ignored_contacts, physics.ignored),
             touching=put(all_units(snapshot), physics.touching),
             link_force=jnp.where(chosen[:, None, None], 0.0, physics.link_force),
@@ -344,9 +346,9 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
             data.eq_active.astype(bool),
         )
 
-    def _kinematics(self, data: mjx.Data) -> mjx.Data:
-        """Body poses of the present positions."""
-        return jax.vmap(lambda d: mjx.kinematics(self.model, d))(data)
+    def _kinematics(self, data: mjx.Data, poses: dict[str, Array]) -> mjx.Data:
+        """Body poses of the present positions. `poses`: fields of `POSES` of each world, where it has its own."""
+        return jax.vmap(lambda own, d: mjx.kinematics(self.model.replace(**own), d))(poses, data)
 
     def _refresh(self, physics: MjxPhysics) -> MjxPhysics:
         """Everything derived, of the present positions."""
@@ -394,3 +396,8 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
             mujoco.mj_resetDataKeyframe(model, data, 0)
         mujoco.mj_forward(model, data)
         return data
+
+
+def _poses(fields: ModelFields) -> dict[str, Array]:
+    """Those of `POSES` that worlds have for themselves."""
+    return {name: array for name, array in given(fields).items() if name in POSES}
