@@ -33,7 +33,7 @@ from ig2mj.tasks.pools import pool_of
 from ig2mj.tasks.relocation import reason_against
 from ig2mj.tasks.splits import HELD_OUT_HOMES, TRAIN_HOMES
 from ig2mj.tasks.task import Task
-from ig2mj.worlds.randomize import AXES, UNFINISHED
+from ig2mj.worlds.randomize import AXES
 
 WORLDS, STEPS, ROWS = 1024, 40, 64
 """Worlds of a throughput measurement, agent steps after as many unmeasured ones, and start states of each home."""
@@ -71,8 +71,7 @@ def throughput(args: argparse.Namespace) -> list[dict[str, Any]]:
 
 def axes(args: argparse.Namespace) -> list[dict[str, Any]]:
     """Without randomization, with each axis, with all, and without it again."""
-    built = [axis for axis in AXES if axis not in UNFINISHED]
-    sets = [[], *([axis] for axis in built), built, []]
+    sets = [[], *([axis] for axis in AXES), list(AXES), []]
     return [{"what": "axes", "task": args.tasks[0], "axes": s, "turn": k} for k, s in enumerate(sets)]
 
 

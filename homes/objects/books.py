@@ -38,5 +38,5 @@ def notebook(b: ObjectBuilder) -> None:
 
 CATEGORIES = [
     Entry("hardback", hardback, (0.235, 0.160, 0.030), 0.55, 10, vary=0.15),
-    Entry("notebook", notebook, (0.210, 0.148, 0.013), 0.26, 4),
+    Entry("notebook", notebook, (0.210, 0.148, 0.013), 0.26, 4, extra=4, wide=True),
 ]

@@ -57,11 +57,12 @@ def build_model(entry: Entry, index: int, seed: int = 0) -> HouseholdObject:
     if is_folder(entry.category):
         return folder_model(entry.category).model
     rng = random.Random(f"{seed}/{entry.category}/{index}")
+    vary = entry.vary * (2 if entry.wide and index >= entry.count else 1)
     if entry.uniform:
-        factor = rng.uniform(1 - entry.vary, 1 + entry.vary)
+        factor = rng.uniform(1 - vary, 1 + vary)
         size = tuple(edge * factor for edge in entry.size)
     else:
-        size = tuple(edge * rng.uniform(1 - entry.vary, 1 + entry.vary) for edge in entry.size)
+        size = tuple(edge * rng.uniform(1 - vary, 1 + vary) for edge in entry.size)
     builder = ObjectBuilder(entry.category, "", size, rng, index, entry.rest)
     entry.build(builder, **entry.options)
     model = builder.finish()

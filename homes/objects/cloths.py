@@ -16,6 +16,9 @@ from .model import ObjectBuilder
 ROLLED = 5
 """Number of the first rolled bath towel. Only the object library has such."""
 
+OF_ITS_KIND = 3
+"""Towels that are rolled up."""
+
 FOLDED = 5
 """Number of the first rag and dishtowel that are folded in four; likewise."""
 
@@ -74,8 +77,8 @@ def rag(b: ObjectBuilder, **options: Any) -> None:
 
 
 def bath_towel(b: ObjectBuilder, **options: Any) -> None:
-    """Folded; from number `ROLLED` on rolled up and standing on end, so that two fingers can take it."""
-    if b.index < ROLLED:
+    """Folded; three from number `ROLLED` on rolled up and standing on end, so that two fingers can take them."""
+    if not ROLLED <= b.index < ROLLED + OF_ITS_KIND:
         folded(b, **options)
         return
     x, y, z = b.size
@@ -157,8 +160,8 @@ def mat(b: ObjectBuilder) -> None:
 
 CATEGORIES = [
     Entry("dishtowel", rag, (0.450, 0.300, 0.014), 0.08, FOLDED, extra=1, vary=0.1, options={"wipes": True}),
-    Entry("hand_towel", folded, (0.200, 0.280, 0.040), 0.18, 5, options={"wipes": True}),
-    Entry("bath_towel", bath_towel, (0.300, 0.360, 0.090), 0.55, ROLLED, extra=3, options={"wipes": True, "layers": 5}),
+    Entry("hand_towel", folded, (0.200, 0.280, 0.040), 0.18, 5, extra=3, options={"wipes": True}),
+    Entry("bath_towel", bath_towel, (0.300, 0.360, 0.090), 0.55, ROLLED, extra=6, options={"wipes": True, "layers": 5}),
     Entry("rag", rag, (0.320, 0.280, 0.018), 0.05, FOLDED, extra=1, vary=0.12, options={"wipes": True}),
     Entry("dinner_napkin", folded, (0.190, 0.190, 0.008), 0.035, 3, options={"wipes": True, "layers": 3}),
     Entry("paper_towel", kitchen_roll, (0.120, 0.120, 0.260), 0.25, 3, rest="standing", uniform=True),

@@ -144,7 +144,7 @@ def open_teapot(b: ObjectBuilder) -> None:
 CATEGORIES = [
     Entry("frying_pan", frying_pan, (0.450, 0.260, 0.060), 1.20, 6, rest="upright"),
     Entry("saucepan", saucepan, (0.360, 0.180, 0.110), 1.10, 5, rest="upright"),
-    Entry("cauldron", cauldron, (0.360, 0.360, 0.360), 6.00, 3, rest="upright", uniform=True, two_hands=True),
+    Entry("cauldron", cauldron, (0.360, 0.360, 0.360), 6.00, 3, extra=5, rest="upright", uniform=True, two_hands=True),
     Entry("kettle", kettle, (0.230, 0.180, 0.230), 1.00, 4, rest="upright", uniform=True),
     Entry("teapot", teapot, (0.230, 0.150, 0.150), 0.70, OPEN, extra=1, rest="upright", uniform=True),
 ]

@@ -29,6 +29,7 @@ class Entry:
       fixed: furniture that is screwed or too heavy to be free in a scene.
       rest: "any" (put down on any stable side), "standing" (mostly as built) or "upright" (only as built).
       vary: each edge is multiplied by a random factor of 1 +- vary; uniform: all three by the same.
+      wide: extra models vary twice as much.
       flesh: material of the cut faces; given for sliceable categories, whose models then come with halves.
       two_hands: may be held by assisted grasping, where it is free, although it is heavier than `AG_MASS` or mostly
         fixed: two hands carry it.
@@ -45,6 +46,7 @@ class Entry:
     rest: str = "any"
     vary: float = 0.08
     uniform: bool = False
+    wide: bool = False
     flesh: Callable[[random.Random], Material] | None = None
     two_hands: bool = False
     options: Mapping[str, Any] = dataclasses.field(default_factory=dict)

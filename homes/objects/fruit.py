@@ -168,7 +168,15 @@ _SLICEABLE: list[Line] = [
 ]  # fmt: skip
 
 CATEGORIES = [
-    Entry(name, build, size, mass, 4, rest="standing", uniform=True, flesh=flesh(rgb), options=options)
+    Entry(
+        *(name, build, size, mass, 4),
+        extra=4 if name == "apple" else 0,
+        rest="standing",
+        uniform=True,
+        wide=True,
+        flesh=flesh(rgb),
+        options=options,
+    )
     for name, build, size, mass, rgb, options in _SLICEABLE
 ] + [
     Entry(f"half_{name}", half_of, (size[0] / 2, size[1], size[2]), mass / 2, 2, uniform=True,

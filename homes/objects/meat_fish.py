@@ -182,7 +182,7 @@ CATEGORIES = [
     Entry("fish", fish, (0.300, 0.090, 0.055), 0.45, 5),
     Entry("fillet", slab, (0.180, 0.080, 0.022), 0.17, 3,
           options={"colours": ((0.95, 0.62, 0.48), (0.94, 0.88, 0.82)), "fat": False}),
-    Entry("steak", slab, (0.180, 0.120, 0.028), 0.30, 4,
+    Entry("steak", slab, (0.180, 0.120, 0.028), 0.30, 4, extra=4, wide=True,
           options={"colours": ((0.58, 0.16, 0.14), (0.45, 0.22, 0.14)), "bone": True}),
     Entry("beef", slab, (0.200, 0.130, 0.080), 1.00, 3, options={"colours": ((0.55, 0.14, 0.13),)}),
     Entry("pork", slab, (0.180, 0.110, 0.030), 0.35, 3, options={"colours": ((0.90, 0.62, 0.56),)}),

@@ -12,6 +12,9 @@ from .entry import Entry
 from .model import ObjectBuilder
 from .parts import ear
 
+OF_ITS_KIND = 3
+"""Carving knives that stand."""
+
 STANDING, STANDING_MASS = 4, 0.15
 """Number of the first carving knife that stands on its handle, edge down, and what such a one weighs, kg. Only the
 object library has such."""
@@ -143,8 +146,8 @@ def knife(b: ObjectBuilder, *, blade: float = 0.55, tall: float = 0.8, grip: str
 
 
 def carving_knife(b: ObjectBuilder, **options: Any) -> None:
-    """Lying on its side; from number `STANDING` on standing on its handle, so that two fingers can take and use it."""
-    if b.index < STANDING:
+    """Lying on its side; three from number `STANDING` on standing on their handles, so that two fingers take them."""
+    if not STANDING <= b.index < STANDING + OF_ITS_KIND:
         knife(b, **options)
         return
     b.rest, b.mass = "upright", STANDING_MASS
@@ -230,7 +233,7 @@ CATEGORIES = [
         (0.330, 0.046, 0.022),
         0.190,
         STANDING,
-        extra=3,
+        extra=7,
         options={"blade": 0.62, "grip": "wood"},
     ),
     Entry("chopstick", chopstick, (0.230, 0.008, 0.008), 0.012, 2),

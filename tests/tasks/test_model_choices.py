@@ -8,6 +8,8 @@ import mujoco
 import numpy as np
 import pytest
 
+import ig2mj
+from ig2mj.envs.experts import expert_of
 from ig2mj.envs.start_choices import varied_models
 from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.scene.library import LibraryModel
@@ -18,6 +20,7 @@ from ig2mj.tasks.model_choices import choices_of, widened
 from ig2mj.tasks.pools import bare_scene, pool_of
 from ig2mj.tasks.registry import load_task
 from ig2mj.tasks.splits import models_of
+from ig2mj.tasks.variants import variant
 from ig2mj.worlds.randomize import Randomize
 
 
@@ -61,6 +64,41 @@ def test_models_of_the_user_join_a_part_of_their_category(tmp_path, monkeypatch)
 def test_only_activities_have_models():
     with pytest.raises(EngineError, match="only the paper's activities have several models"):
         varied_models(load_task("PointNavigation"), Randomize(objects=True), "train")
+
+
+def test_models_for_friction_alone_take_no_part_with_other_grasping_and_the_other_way_round():
+    names = [knife for _, knife in choices_of(ACTIVITIES["SlicingFruit"], "train", 9).models]
+    by_friction = choices_of(variant(ACTIVITIES["SlicingFruit"], 0, "physical"), "train", 9)
+    standing = {text.partition("/")[2] for texts in ACTIVITIES["SlicingFruit"].physical.objects for text in texts}
+    assert not set(names) & standing and {knife for _, knife in by_friction.models} <= standing
+
+
+def test_models_can_be_named_in_place_of_a_part():
+    chosen = choices_of(ACTIVITIES["CookingMeat"], "train", 4, ("steak/steak_02", "steak/steak_00"))
+    assert chosen.models == (("steak_02",), ("steak_00",)) and chosen.names[1] == ("steak_0",)
+    with pytest.raises(UnknownNameError, match="near matches: steak_02"):
+        choices_of(ACTIVITIES["CookingMeat"], "train", 4, ("steak/steak_2",))
+    with pytest.raises(EngineError, match="none is a steak"):
+        choices_of(ACTIVITIES["CookingMeat"], "train", 4, ("apple/apple_00",))
+
+
+@pytest.mark.slow
+def test_experts_take_whichever_model_is_in_use_and_no_guard_minds_the_others():
+    """Also where the home's own object waits on the slab, far below the floor."""
+    env = ig2mj.make("GraspingBook", "humanoid", 6, "native", pool_size=6, randomize=["objects"])
+    expert, state = expert_of(env), env.start_from(np.arange(6))
+    models = np.asarray(state.draw.models)[:, 0]
+    assert len(set(models.tolist())) > 1
+    success, begun = np.zeros(6, bool), np.asarray(state.batch.world.view.object_pos)[np.arange(6), models]
+    ahead = [env.privileged_names.index(name) for name in env.privileged_names if name.startswith("notebook_0")][:1]
+    assert np.ptp(np.asarray(state.obs["privileged_state"])[:, ahead]) > 0.01, "ground truth is of the model in use"
+    for step in range(40):
+        state = env.step(state, np.asarray(expert(state)))
+        success |= np.asarray(state.info["success"])
+        if step == 2:  # it was put down at rest
+            now = np.asarray(state.batch.world.view.object_pos)[np.arange(6), models]
+            assert np.linalg.norm(now - begun, axis=1).max() < 0.005
+    assert success.all() and not np.asarray(state.info["flags"]).any()
 
 
 @pytest.mark.slow

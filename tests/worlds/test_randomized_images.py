@@ -9,15 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from ig2mj.errors import EngineError
 from ig2mj.scene.scene import load_scene
 from ig2mj.sensors.base import Space
 from ig2mj.sensors.noise import noisy
 from ig2mj.sensors.shading import FOV_PER_WORLD, LIGHTS_PER_WORLD, limit_light
-from ig2mj.worlds.draw import SPARE_LIGHTS, Draw
+from ig2mj.worlds.draw import SPARE_LIGHTS
 from ig2mj.worlds.random_streams import episode_keys
 from ig2mj.worlds.randomization import Randomization, kind_of_material, quat_of
-from ig2mj.worlds.randomize import AXES, UNFINISHED, Lights, Materials, Randomize, SensorNoise
+from ig2mj.worlds.randomize import Lights, Materials, Randomize, SensorNoise
 
 WORLDS = 64
 
@@ -91,11 +90,3 @@ def test_the_kernel_takes_what_differs_between_worlds(monkeypatch):
     monkeypatch.setattr("ig2mj.sensors.shading.defined", lambda name, text, globals: lambda *_: made.append(text))
     limit_light(types.SimpleNamespace(), 3, changes=(*LIGHTS_PER_WORLD, *FOV_PER_WORLD))
     assert made[0].count("M_NLIGHT - 1") == 3 and "wide * ray_dir_local_cam[0]" in made[0]
-
-
-def test_axes_that_do_not_work_yet_are_refused_by_name():
-    with pytest.raises(EngineError, match="the axis robot_start does not work yet"):
-        Randomize(robot_start=True).check_finished()
-    assert set(Randomize.every().axes) == set(AXES) - UNFINISHED
-    Randomize.every().check_finished()
-    assert Draw() == Draw()

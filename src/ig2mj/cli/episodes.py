@@ -44,7 +44,7 @@ def show(
 
     Args:
       name: a file, or the name of a task whose episodes ship.
-      episode: also print where this episode's objects start, from 0.
+      episode: also print where this episode's objects start, from 0, and what was drawn for it.
       json: print one JSON object.
     """
     import json as form
@@ -75,6 +75,9 @@ def show(
         for name, pose in start["objects"].items():
             print(f"  {name}: {pose['pos']} m, {pose['quat']}")
         for name, value in start["states"].items():
+            print(f"  {name}: {value}")
+        print("drawn, each for its axis and for all together:")
+        for name, value in start["draws"].items():
             print(f"  {name}: {value}")
     return 0
 

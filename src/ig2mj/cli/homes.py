@@ -224,9 +224,11 @@ def _convert_objects(
         ASSETS,
         FOLDER,
         PREFERRED_FILE,
+        VARIANTS_FILE,
         is_fixed,
         library_models,
         preferred_models,
+        split_models,
     )
     from ig2mj_homes.dataset.ship import strip_report
 
@@ -237,9 +239,10 @@ def _convert_objects(
         options = ConvertOptions(assets=ASSETS, cache=cache, max_hulls=MAX_HULLS)
         convert_object(urdf, category, folder, model=model, fixed=is_fixed(category), options=options)
         failed += strip_report(folder, keep_checks=False)
-    if preferred := preferred_models(models):
-        text = json.dumps(preferred, indent=1, sort_keys=True) + "\n"
-        (out / FOLDER / PREFERRED_FILE).write_text(text, encoding="utf-8", newline="\n")
+    for file, content in ((PREFERRED_FILE, preferred_models(models)), (VARIANTS_FILE, split_models(models))):
+        if content:
+            text = json.dumps(content, indent=1, sort_keys=True) + "\n"
+            (out / FOLDER / file).write_text(text, encoding="utf-8", newline="\n")
     return len(models)
 
 

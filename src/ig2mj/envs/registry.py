@@ -285,8 +285,6 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     control = Control(whole, config.period)
     split, pool_size = start_part(config.split), config.pool_size
     differs = config.randomize
-    if differs is not None:
-        differs.check_finished()
     choices = None if differs is None else varied_models(task, differs, config.split)
     if isinstance(task, NavigationTask):
         setup = setup_navigation(task, body, split, pool_size, control)
@@ -312,9 +310,8 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         own = (*differs.model_fields, *moving_fields(task, setup, differs))
         options = {**options, "model_fields": (*options.get("model_fields", ()), *own)}
     if config.doors == "open":
-        starts, poses = (
-            None if pool is None else with_open_doors(scene, pool, named_objects(task)) for pool in (starts, poses)
-        )
+        starts = with_open_doors(scene, starts, named_objects(task))
+        poses = None if poses is None else with_open_doors(scene, poses, named_objects(task))
     physics = make_engine(engine, scene, config.worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
     every_number = whole or isinstance(task, BddlTask)  # of the action; some ask hands back

@@ -25,6 +25,9 @@ from ig2mj.process import entry_point
 Act = Callable[[EnvState], Array]
 """Actions [W, n] from the state of all worlds."""
 
+Start = Callable[[np.ndarray], EnvState]
+"""The state at the start of episodes, from W rows of the environment's pool."""
+
 Watch = Callable[[EnvState], None]
 """Called with the state at the start of episodes and after every step."""
 
@@ -65,6 +68,7 @@ def play(
     first: int = 0,
     report: ProgressCallback = no_progress,
     seeds: Sequence[int] | None = None,
+    start: Start | None = None,
 ) -> Played:
     """Plays episodes.
 
@@ -72,11 +76,12 @@ def play(
       act: who acts. seed: of the start states that are drawn.
       in_order: begin with the rows of the environment's pool, each once; again from the first where there are fewer.
         Where an episode is over actions are zero until all are.
-      first: of these rows. seeds: of the episode that begins with each row, in place of `seed`.
+      first: of these rows. seeds: of the episode that begins with each row, in place of `seed`. start: makes the state
+        of all worlds at the start of episodes of these rows, in place of `Environment.start_from`.
       report: called after every step with a share of the episodes (0 to 1) and 1.
     """
     if in_order:
-        return _in_order(env, act, episodes, seed if seeds is None else seeds, watch, first, report)
+        return _in_order(env, act, episodes, seed if seeds is None else seeds, watch, first, report, start)
     return _drawn(env, act, episodes, seed, watch, report)
 
 
@@ -116,15 +121,19 @@ def _in_order(
     episodes: int,
     seed: int | Sequence[int],
     watch: Watch | None,
-    start: int,
+    begin: int,
     report: ProgressCallback,
+    start: Start | None,
 ) -> Played:
     size, worlds = env.core.starts.pool.size, env.num_worlds
     tallies, pace, state, metrics = list[Tally](), Pace(watch), None, collections.Counter[str]()
     begun, failed = list[np.ndarray](), None
     for first in range(0, episodes, worlds):
-        rows = (start + first + np.arange(worlds)) % size
-        state = env.start_from(rows, seed if isinstance(seed, int) else [seed[int(row)] for row in rows])
+        rows = (begin + first + np.arange(worlds)) % size
+        if start is not None:
+            state = start(rows)
+        else:
+            state = env.start_from(rows, seed if isinstance(seed, int) else [seed[int(row)] for row in rows])
         pace.look(state)
         tally = Tally.begun(state, env.objective.outcomes)
         begun.append(np.asarray(state.status.literals))

@@ -1,4 +1,4 @@
-"""What start states of an environment are taken from: parts of a split, other models and poses, augmented rows, doors."""
+"""What start states of an environment are taken from: parts of a split, other models and poses, augmentation, doors."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def varied_models(task: AnyTask, randomize: Randomize, split: str) -> ModelChoic
         return None
     if not isinstance(task, Task) or task.code is not None:
         raise EngineError(f"randomize: objects of {task.name}: only the paper's activities have several models")
-    return choices_of(task, Split.of(split).models, varied.count)
+    return choices_of(task, Split.of(split).models, varied.count, varied.models)
 
 
 def varied_poses(task: AnyTask, setup: EnvSetup, randomize: Randomize, split: str) -> Pool | None:

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ig2mj.callbacks import ProgressCallback, no_progress
-from ig2mj.envs.environment import Environment
+from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import make
 from ig2mj.envs.rollout import Act, play
 from ig2mj.errors import PolicyServerError
-from ig2mj.learn.episodes import ALL, Episodes
+from ig2mj.learn.episodes import ALL, EpisodePart, Episodes
 from ig2mj.learn.evaluate import wilson
 
 ActOf = Callable[[Environment], Act]
@@ -57,9 +57,10 @@ class AxisResult:
         return [k for k, done in enumerate(self.success) if not done]
 
 
-def axis_environment(episodes: Episodes, axis: str, options: Mapping[str, Any]) -> Environment:
-    """The environment that plays an axis. `options`: of `ig2mj.make`."""
-    env = make(episodes.header["task"], pool=episodes.pool, **{**options, **episodes.options(axis)})
+def axis_environment(episodes: Episodes, axis: str, part: EpisodePart, options: Mapping[str, Any]) -> Environment:
+    """The environment that plays a part of an axis. `options`: of `ig2mj.make`."""
+    worlds = min(options.get("worlds", 1), len(part.numbers))
+    env = make(episodes.header["task"], **{**options, "worlds": worlds, **episodes.options(axis, part.home)})
     if "instructions" in episodes.axes[axis]:
         env.wordings = tuple(episodes.header["instructions"]["held_out"])
     return env
@@ -84,14 +85,33 @@ def evaluate_axes(
     """
     found = []
     for number, axis in enumerate(axes):
-        env = axis_environment(episodes, axis, options)
+        parts, ended = episodes.parts(axis, count), dict[int, tuple[bool, float]]()
+        failed = None
+        for k, part in enumerate(parts):
+            env = axis_environment(episodes, axis, part, options)
+            share = (number + k / len(parts)) / len(axes)
 
-        def forward(done: float, total: float | None, text: str = "", number: int = number, axis: str = axis) -> None:
-            report((number + done) / len(axes), total, f"{axis}: {text}")
+            def forward(
+                done: float,
+                total: float | None,
+                text: str = "",
+                share: float = share,
+                of: float = len(axes) * len(parts),
+                axis: str = axis,
+            ) -> None:
+                report(share + done / of, total, f"{axis}: {text}")
 
-        played = play(env, act_of(env), count, in_order=True, report=forward, seeds=episodes.seeds)
-        found.append(AxisResult(axis, played.success, played.q, played.failed))
-        if played.failed is not None:
+            def start(rows: np.ndarray, env: Environment = env, axis: str = axis, part: EpisodePart = part) -> EnvState:
+                return episodes.start(env, axis, part, rows.tolist())
+
+            played = play(env, act_of(env), len(part.numbers), in_order=True, report=forward, start=start)
+            ended |= dict(zip(part.numbers, zip(played.success, played.q, strict=True), strict=False))
+            failed = played.failed
+            if failed is not None:
+                break
+        last = [ended[episode] for episode in sorted(ended)]
+        found.append(AxisResult(axis, [s for s, _ in last], [q for _, q in last], failed))
+        if failed is not None:
             break
     return found
 

@@ -1,4 +1,5 @@
-"""What an episode of a file starts with, for people: poses of loose objects, and states that are not usual."""
+"""What an episode of a file starts with, for people: poses of loose objects, states that are not usual, and what was
+drawn for it."""
 
 from __future__ import annotations
 
@@ -7,14 +8,15 @@ from typing import Any
 import numpy as np
 
 from ig2mj.envs.registry import make
-from ig2mj.learn.episodes import Episodes
+from ig2mj.learn.episodes import ALL, Episodes
 
 BOOLEANS = ("toggled_on", "sliced")
 """Extended states of objects that are listed where they are true."""
 
 
 def described(episodes: Episodes, number: int) -> dict[str, Any]:
-    """Seed, poses (m, w-x-y-z, world frame) of loose objects, temperatures above the room's, what is on or sliced."""
+    """Seed, poses (m, w-x-y-z, world frame) of loose objects, temperatures above the room's, what is on or sliced, and
+    the values that were drawn."""
     task, robot = episodes.header["task"], next(iter(episodes.header["robots"]))
     env = make(task, robot=robot, engine="native", pool=episodes.pool)
     state = env.start_from(np.array([number]), [episodes.seeds[number]])
@@ -37,4 +39,5 @@ def described(episodes: Episodes, number: int) -> dict[str, Any]:
         f"temperature of {tables.object_names[o]}": round(float(warm[o]), 1)
         for o in np.flatnonzero(np.abs(warm - usual) > 1.0)
     }
-    return {"number": number, "seed": episodes.seeds[number], "objects": objects, "states": states}
+    draws = episodes.described_draws(ALL, number, robot, tables.object_names)
+    return {"number": number, "seed": episodes.seeds[number], "objects": objects, "states": states, "draws": draws}

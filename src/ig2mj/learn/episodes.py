@@ -1,14 +1,18 @@
 """Episode files: fixed episodes of a task on which policies are compared, the same on every machine.
 
     episodes = Episodes.load(find_episodes("CookingMeat"))
-    env = ig2mj.make("CookingMeat", pool=episodes.pool, **episodes.options("lights"))
-    state = env.start_from([0], [episodes.seeds[0]])
+    part = episodes.parts("lights", count=8)[0]
+    env = ig2mj.make("CookingMeat", worlds=8, **episodes.options("lights", part.home))
+    state = episodes.start(env, "lights", part, range(8))
 
-A file has of each episode the poses and states of all objects of the home (a row of a pool), the seed from which all
-that is drawn for it follows, and its instruction, usual and held out; and of all of them the home with its objects, the
-robots with their cameras, and for each axis the settings of `ig2mj.Randomize`. Its hash is part of its header.
+A file has of each episode the poses and states of all objects of the home (a row of a pool), a second start state for
+the axis `object_poses`, one in another home for the axis `homes`, and all values that were drawn for it
+(`ig2mj.learn.episode_draws`); and of all of them the home with its objects, the robots with their cameras, the
+instructions, and for each axis the settings of `ig2mj.Randomize`. The seed of an episode is for what is drawn in its
+course, such as noise. Its hash is part of its header.
 
-The axis `nominal` varies nothing; others are those of `Randomize`, one at a time; `all` is all of them together.
+The axis `nominal` varies nothing; `homes` the home; others are those of `Randomize`, one at a time; `all` is all of
+these together.
 """
 
 from __future__ import annotations
@@ -24,20 +28,29 @@ import jax
 import msgspec
 import numpy as np
 
-from ig2mj.envs.environment import Environment
+from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import find_task, make
 from ig2mj.errors import EngineError, InputError, UnknownNameError
+from ig2mj.learn.episode_draws import FACTORS, SETS, EpisodeDraws, described_draw, model_names
 from ig2mj.scene.found_again import entries_of
 from ig2mj.sensors.cameras import camera_names
+from ig2mj.tasks.homes import in_home
 from ig2mj.tasks.instructions import wordings
+from ig2mj.tasks.model_choices import widened
+from ig2mj.tasks.object_poses import spread_starts
+from ig2mj.tasks.pools import bare_scene, pool_of
+from ig2mj.tasks.relocation import reason_against
+from ig2mj.tasks.splits import HELD_OUT_HOMES
 from ig2mj.tasks.task import Task
+from ig2mj.tasks.variants import variant
 from ig2mj.worlds.archive import pack, read_header, save_tree, unpack
 from ig2mj.worlds.pool import Pool, pool_of_arrays
-from ig2mj.worlds.randomize import AXES, UNFINISHED, Randomize
+from ig2mj.worlds.randomize import AXES, Objects, Randomize
 
-KIND, FORMAT_VERSION = "episodes", 1
+KIND, FORMAT_VERSION = "episodes", 2
+"""1: without values, which then follow from the seeds, and without `object_poses` and `homes`."""
 
-NOMINAL, ALL, HOMES = "nominal", "all", "homes"
+NOMINAL, ALL, HOMES, POSES = "nominal", "all", "homes", "object_poses"
 
 EVERY = (NOMINAL, *AXES, HOMES, ALL)
 """Names of axes, in the order of tables."""
@@ -58,16 +71,11 @@ FOLDERS = (_HERE.parents[3] / "episodes", _HERE.parents[2] / "ig2mj_episodes")
 """Where files ship: in a checkout, and next to the installed package."""
 
 
-def possible_axes() -> tuple[str, ...]:
-    """The axes that can be played; `all` is those of `Randomize` among them together."""
-    return (NOMINAL, *(name for name in AXES if name not in UNFINISHED), ALL)
-
-
 def parse_axes(text: str) -> tuple[str, ...]:
-    """Axes of a list such as "nominal,lights"; "all" alone is every axis that can be played, and their combination.
+    """Axes of a list such as "nominal,lights"; "all" alone is every axis, and their combination.
 
     Raises:
-      UnknownNameError: no such axis, with near matches. EngineError: one cannot be played yet.
+      UnknownNameError: no such axis, with near matches. EngineError: none is named.
     """
     names = [name.strip() for name in text.split(",") if name.strip()]
     if not names:
@@ -76,19 +84,17 @@ def parse_axes(text: str) -> tuple[str, ...]:
         if name not in EVERY:
             raise UnknownNameError("axis", name, EVERY)
     if names == [ALL]:
-        return possible_axes()
-    for name in names:
-        if name not in possible_axes():
-            raise EngineError(f"the axis '{name}' cannot be played yet ({', '.join(possible_axes())} can)")
-    if not names:
-        raise EngineError(f"no axis is named (take some of {', '.join(possible_axes())}, or all)")
+        return EVERY
     return tuple(dict.fromkeys((NOMINAL, *names)))
 
 
-def randomize_of(axis: str) -> Randomize | None:
-    """What varies in the episodes of an axis."""
-    names = [n for n in AXES if n not in UNFINISHED] if axis == ALL else [axis] if axis in AXES else []
-    return Randomize.of(names) if names else None
+@dataclasses.dataclass(frozen=True)
+class EpisodePart:
+    """Episodes that are played in one environment. Attributes: home: None: the task's own. numbers: in the file; the
+    k-th is row k of the environment's pool."""
+
+    home: str | None
+    numbers: tuple[int, ...]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,11 +103,16 @@ class Episodes:
 
     Attributes:
       header: all that is no array, with "hash". pool: start states, a row for each episode. seeds: of each episode.
+      draws: values that were drawn. poses: start states of the axis `object_poses`. homes: by home, those of `homes`:
+        episode k is in the home k % H, its row k // H.
     """
 
     header: dict[str, Any]
     pool: Pool
     seeds: tuple[int, ...]
+    draws: EpisodeDraws
+    poses: Pool | None = None
+    homes: Mapping[str, Pool] = dataclasses.field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -113,16 +124,52 @@ class Episodes:
         """Settings of `Randomize` of each axis."""
         return self.header["axes"]
 
-    def options(self, axis: str) -> dict[str, Any]:
-        """Of `ig2mj.make`: what varies in an axis, and how it is worded. Raises EngineError: the file lacks it."""
+    def check_axis(self, axis: str) -> None:
+        """Raises EngineError: the file lacks an axis."""
         if axis not in self.axes:
             raise EngineError(f"the episodes of {self.header['task']} have no axis '{axis}' ({', '.join(self.axes)})")
-        settings = self.axes[axis]
-        return {"randomize": settings} if settings else {}
+
+    def parts(self, axis: str, count: int) -> list[EpisodePart]:
+        """The first episodes of an axis, by environment. Raises EngineError: the file lacks it."""
+        self.check_axis(axis)
+        if axis != HOMES:
+            return [EpisodePart(None, tuple(range(count)))]
+        homes = list(self.homes)
+        numbers = [tuple(range(k, count, len(homes))) for k in range(len(homes))]
+        return [EpisodePart(home, own) for home, own in zip(homes, numbers, strict=True) if own]
+
+    def options(self, axis: str, home: str | None = None) -> dict[str, Any]:
+        """Of `ig2mj.make`: start states, and what varies in an axis. Raises EngineError: the file lacks it.
+
+        Args:
+          home: of `EpisodePart`.
+        """
+        self.check_axis(axis)
+        settings = dict(self.axes[axis])
+        if home is not None:
+            return {"home": home, "pool": self.homes[home]}
+        pool = self.pool
+        if settings.pop(POSES, None) is not None:
+            assert self.poses is not None
+            pool = self.poses
+        return {"pool": pool, **({"randomize": settings} if settings else {})}
+
+    def start(self, env: Environment, axis: str, part: EpisodePart, rows: Sequence[int]) -> EnvState:
+        """The state at the start of episodes: rows of a part, each in one world of an environment made for it."""
+        numbers = [part.numbers[int(row) % len(part.numbers)] for row in rows]
+        rows = [int(row) % len(part.numbers) for row in rows] if part.home is not None else numbers
+        return self.draws.start(env, rows, numbers, [self.seeds[number] for number in numbers])
+
+    def described_draws(self, axis: str, number: int, robot: str, names: Sequence[str]) -> dict[str, Any]:
+        """What was drawn for an episode, for people. `names`: of the scene's objects."""
+        found = described_draw(self.draws.values(tuple(self.axes[axis]), [number], robot), names)
+        if "objects" in self.axes[axis] and self.draws.models:
+            found["models"] = list(self.draws.models[number])
+        return found
 
     def save(self, file: str | os.PathLike) -> None:
         """Writes it. Raises InputError."""
-        save_tree(file, {"pool": self.pool, "seeds": np.array(self.seeds, np.int32)}, self.header)
+        save_tree(file, _tree(self), self.header)
 
     @classmethod
     def load(cls, file: str | os.PathLike) -> Episodes:
@@ -132,8 +179,8 @@ class Episodes:
           InputError: it is missing, damaged, no such file, or changed since it was made.
         """
         header = read_header(file)
-        if header.get("kind") != KIND or header.get("format_version") != FORMAT_VERSION:
-            raise InputError(file, f"holds no episodes of format {FORMAT_VERSION}", fix=FIX)
+        if header.get("kind") != KIND or header.get("format_version") not in (1, FORMAT_VERSION):
+            raise InputError(file, f"holds no episodes of format 1 to {FORMAT_VERSION}", fix=FIX)
         try:
             known = msgspec.convert(header, _Header)
         except (msgspec.ValidationError, RecursionError) as e:
@@ -142,14 +189,39 @@ class Episodes:
         seeds = arrays.pop("seeds", np.zeros(0, np.int32))
         if seeds.ndim != 1 or seeds.dtype.kind != "i" or not len(seeds):
             raise InputError(file, "is no list of whole numbers", element="seeds", fix=FIX)
-        rows = {name.removeprefix("pool."): a for name, a in arrays.items() if name.startswith("pool.")}
-        pool = dataclasses.replace(pool_of_arrays(rows, None, str(file)), digest=known.digest)
-        found = cls(header, pool, tuple(map(int, seeds)))
-        if any(len(a) != found.count for a in rows.values()):
-            raise InputError(file, f"has not {found.count} rows in every array", fix=FIX)
-        if known.hash != digest_of(header, pool, found.seeds):
+
+        def pool(prefix: str, digest: str) -> Pool:
+            rows = {name.removeprefix(prefix): a for name, a in arrays.items() if name.startswith(prefix)}
+            return dataclasses.replace(pool_of_arrays(rows, None, str(file)), digest=digest)
+
+        def named(prefix: str) -> dict[str, np.ndarray]:
+            return {name.removeprefix(prefix): a for name, a in arrays.items() if name.startswith(prefix)}
+
+        draws = EpisodeDraws(named("draws."), named("robots."), known.models)
+        poses = pool("poses.", known.digest) if any(name.startswith("poses.") for name in arrays) else None
+        homes = {home: pool(f"homes.{home}.", digest) for home, digest in known.homes.items()}
+        found = cls(header, pool("pool.", known.digest), tuple(map(int, seeds)), draws, poses, homes)
+        found.check_rows(file)
+        if known.hash != digest_of(found):
             raise InputError(file, "has changed since it was made: its hash does not fit", element="hash", fix=FIX)
         return found
+
+    def check_rows(self, file: str | os.PathLike) -> None:
+        """Raises InputError: an array has not one row for each episode, or for each set of values."""
+        wrong = [f"pool.{k}" for k, a in enumerate(jax.tree.leaves(self.pool)) if len(a) != self.count]
+        if self.poses is not None:
+            wrong += [f"poses.{k}" for k, a in enumerate(jax.tree.leaves(self.poses)) if len(a) != self.count]
+        for name, array in self.draws.arrays.items():
+            if len(array) != (min(SETS, self.count) if name in FACTORS else self.count):
+                wrong.append(f"draws.{name}")
+        wrong += [f"robots.{name}" for name, a in self.draws.robots.items() if a.shape != (self.count, 3)]
+        if self.draws.models and len(self.draws.models) != self.count:
+            wrong.append("models")
+        for k, (home, pool) in enumerate(self.homes.items()):
+            least = len(range(k, self.count, len(self.homes)))
+            wrong += [f"homes.{home}.{n}" for n, a in enumerate(jax.tree.leaves(pool)) if len(a) < least]
+        if wrong:
+            raise InputError(file, f"has not {self.count} rows", element=wrong[0], fix=FIX)
 
 
 class _Header(msgspec.Struct):
@@ -162,14 +234,24 @@ class _Header(msgspec.Struct):
     instructions: dict[str, list[str]]
     objects: list[dict[str, Any]] = []
     robots: dict[str, Any] = {}
+    models: list[list[str]] = []
+    homes: dict[str, str] = {}
 
 
-def digest_of(header: Mapping[str, Any], pool: Pool, seeds: Sequence[int]) -> str:
+def _tree(episodes: Episodes) -> dict[str, Any]:
+    """All arrays of a file."""
+    draws = episodes.draws
+    tree: dict[str, Any] = {"pool": episodes.pool, "seeds": np.array(episodes.seeds, np.int32)}
+    tree |= {"draws": dict(draws.arrays), "robots": dict(draws.robots), "homes": dict(episodes.homes)}
+    return tree if episodes.poses is None else {**tree, "poses": episodes.poses}
+
+
+def digest_of(episodes: Episodes) -> str:
     """Hash of everything in a file."""
     hashed = hashlib.blake2b(digest_size=16)
-    plain = {name: value for name, value in header.items() if name != "hash"}
+    plain = {name: value for name, value in episodes.header.items() if name != "hash"}
     hashed.update(msgspec.json.encode(plain, order="deterministic"))
-    arrays, _ = unpack(pack({"pool": pool, "seeds": np.array(seeds, np.int32)}, {}))
+    arrays, _ = unpack(pack(_tree(episodes), {}))
     for name in sorted(arrays):
         hashed.update(f"{name} {arrays[name].dtype} {arrays[name].shape}".encode())
         hashed.update(np.ascontiguousarray(arrays[name]).data)
@@ -177,7 +259,7 @@ def digest_of(header: Mapping[str, Any], pool: Pool, seeds: Sequence[int]) -> st
 
 
 def make_episodes(task: str, count: int = COUNT, grasping: str | None = None) -> Episodes:
-    """Episodes of a task on its first held-out start states.
+    """Episodes of a task on its first held-out start states, and in the held-out homes that it fits into.
 
     Raises:
       EngineError: not one of the paper's activities. UnknownNameError: no such task.
@@ -185,33 +267,83 @@ def make_episodes(task: str, count: int = COUNT, grasping: str | None = None) ->
     known = find_task(task)
     if not isinstance(known, Task):
         raise EngineError(f"episodes of {task}: start states of the paper's activities and of tasks like them are kept")
-    robots, env = {}, None
-    for robot in known.robots:
-        env = make(task, robot=robot, engine="native", grasping=grasping, split=HELD_OUT, pool_size=count)
-        robots[robot] = _robot(env)
-    assert env is not None
-    pool = _bare(env.core.starts.pool, env.scene.digest)
+    base = variant(known, 0, grasping or known.grasping)
+    axes = _possible(task, grasping)
+    options: dict[str, Any] = {"grasping": grasping, "engine": "native", "split": f"{HELD_OUT}:objects"}
+    envs = {robot: make(task, robot=robot, pool_size=count, randomize=axes, **options) for robot in known.robots}
+    plain = make(task, pool_size=count, **{**options, "split": HELD_OUT})
+    pool = _bare(pool_of(base, HELD_OUT, count), plain.scene.digest)
     seeds = tuple(SEED + k for k in range(pool.size))
+    poses = _repeated(_bare(spread_starts(base, HELD_OUT, pool.size), plain.scene.digest), pool.size)
+    first = next(iter(envs.values()))
+    other = widened(poses, bare_scene(base), first.scene) if "objects" in axes else poses
+    draws = EpisodeDraws.drawn(envs, seeds, other)
+    homes = {} if known.fit is None else _homes(base, pool.size)
     usual, held_out = wordings(known), wordings(known, held_out=True)
     header = {
         "kind": KIND,
         "format_version": FORMAT_VERSION,
         "task": known.name,
-        "scene": env.scene.name,
-        "digest": env.scene.digest,
-        "grasping": env.grasping,
-        "objects": [{"name": o.name, "category": o.category, "model": o.model} for o in env.scene.manifest.objects],
-        "additions": entries_of(env.scene.additions),
-        "robots": robots,
+        "scene": plain.scene.name,
+        "digest": plain.scene.digest,
+        "grasping": plain.grasping,
+        "objects": [{"name": o.name, "category": o.category, "model": o.model} for o in plain.scene.manifest.objects],
+        "additions": entries_of(plain.scene.additions),
+        "robots": {robot: _robot(env) for robot, env in envs.items()},
         "instructions": {"usual": list(usual), "held_out": list(held_out)},
-        "axes": {axis: _settings(axis) for axis in possible_axes()},
+        "models": [list(names) for names in draws.models],
+        "homes": {home: pool.digest for home, pool in homes.items()},
+        "axes": _axes(axes, first, bool(homes)),
     }
-    return Episodes({**header, "hash": digest_of(header, pool, seeds)}, pool, seeds)
+    made = Episodes(header, pool, seeds, draws, poses, homes)
+    return dataclasses.replace(made, header={**header, "hash": digest_of(made)})
 
 
-def _settings(axis: str) -> dict[str, Any]:
-    found = randomize_of(axis)
-    return {} if found is None else found.as_dict()
+def _possible(task: str, grasping: str | None) -> dict[str, Any]:
+    """Settings of the axes of `Randomize` that a task can vary, but for the poses of objects."""
+    found = {}
+    for axis, kind in AXES.items():
+        if axis in ("objects", "robot_start"):
+            try:
+                env = make(task, grasping=grasping, engine="native", pool_size=1, randomize=[axis])
+                env.core.starts.no_draw(1)
+            except EngineError:
+                continue
+        if axis != POSES:
+            found[axis] = kind()
+    return found
+
+
+def _axes(axes: Mapping[str, Any], env: Environment, homes: bool) -> dict[str, dict[str, Any]]:
+    """Settings of `Randomize` of each axis of a file, with the models that its episodes have by name."""
+    if "objects" in axes:
+        names = dict.fromkeys(name for every in model_names(env) for name in every)
+        axes = {**axes, "objects": Objects(axes["objects"].count, tuple(names))}
+    every = {**axes, POSES: AXES[POSES]()}
+    found = {axis: _settings([axis], every) for axis in AXES if axis in every}
+    return {NOMINAL: {}, **found, **({HOMES: {}} if homes else {}), ALL: _settings(every, every)}
+
+
+def _settings(names: Sequence[str] | Mapping[str, Any], every: Mapping[str, Any]) -> dict[str, Any]:
+    return Randomize(**{name: every[name] for name in AXES if name in names}).as_dict()
+
+
+def _homes(task: Task, count: int) -> dict[str, Pool]:
+    """Start states in the held-out homes that a task fits into, shared out evenly."""
+    fitting = [home for home in HELD_OUT_HOMES if not reason_against(task, home)]
+    found = {}
+    for k, home in enumerate(fitting):
+        moved = in_home(task, home)
+        assert isinstance(moved, Task)
+        rows = len(range(k, count, len(fitting)))
+        if rows:
+            found[home] = _bare(pool_of(moved, HELD_OUT, rows), bare_scene(moved).digest)
+    return found
+
+
+def _repeated(pool: Pool, count: int) -> Pool:
+    """So many rows, beginning again after the last."""
+    return pool.rows(np.arange(count) % pool.size)
 
 
 def _bare(pool: Pool, digest: str) -> Pool:

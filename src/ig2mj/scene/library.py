@@ -27,7 +27,7 @@ from ig2mj.scene.physics_digest import physics_digest, without_insides
 FOLDER = "objects"
 MODEL_FILE = "object.xml"
 SCENE_FILE = "scene.xml"
-PREFERRED_FILE = "preferred.json"
+PREFERRED_FILE, VARIANTS_FILE = "preferred.json", "variants.json"
 
 ROBOT = "agent"
 """Category of robots that `ig2mj convert robot` wrote."""
@@ -111,6 +111,14 @@ def library() -> dict[str, dict[str, LibraryModel]]:
         if first in found.get(category, ()):
             found[category] = {first: found[category][first], **found[category]}
     return found
+
+
+@functools.cache
+def split_models() -> dict[str, list[str]]:
+    """Models of the library that ships which are there for splits alone, by category: activities are not bound to them
+    by their size."""
+    file = paths.SHIPPED_HOMES / FOLDER / VARIANTS_FILE
+    return msgspec.json.decode(file.read_bytes(), type=dict[str, list[str]]) if file.is_file() else {}
 
 
 def own_library() -> dict[str, dict[str, LibraryModel]]:

@@ -26,7 +26,7 @@ from ig2mj.engine.layout import make_layout
 from ig2mj.engine.registry import make_engine
 from ig2mj.engine.snapshot import AXIS, Snapshot
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.errors import EngineError
+from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.additions import name_additions
 from ig2mj.scene.library import LibraryName, find_model, library
@@ -67,14 +67,16 @@ class ModelChoices:
         return ModelSwaps(scene, self.roles, self.names)
 
 
-def choices_of(task: Task, part: str, count: int) -> ModelChoices:
+def choices_of(task: Task, part: str, count: int, models: Sequence[str] = ()) -> ModelChoices:
     """The choices of a task.
 
     Args:
-      part: of the models, "train" or "held_out". count: the most models of an object.
+      part: of the models, "train" or "held_out". count: the most models of an object. models: those that are taken,
+        "category/model", of whatever part; (): of the part.
 
     Raises:
-      EngineError: nothing of the task varies, or a category has no model in this part.
+      EngineError: nothing of the task varies, or a category has no model in this part. UnknownNameError: there is no
+        such model.
     """
     home = load_manifest(scene_folder(task.home))
     taken = [entry.name for entry in home.objects]
@@ -96,7 +98,11 @@ def choices_of(task: Task, part: str, count: int) -> ModelChoices:
         pool, joined = models_with_parts(category)
         pool = [name for name in pool if name in joined or f"{category}/{name}" not in other_use]
         own = None if model is None else model.model
-        for name in _most(models_of(pool, part, joined), joined, count):
+        if models:
+            taken_models = _named(models, category, pool, task)
+        else:
+            taken_models = _most(models_of(pool, part, joined), joined, count)
+        for name in taken_models:
             if name == own:
                 found.setdefault(role, []).append((role, name))
                 continue
@@ -106,7 +112,7 @@ def choices_of(task: Task, part: str, count: int) -> ModelChoices:
     options = {role: [(name or next(fresh), model) for name, model in every] for role, every in found.items()}
     most = max(map(len, options.values()))
     sets = [[options[role][k % len(options[role])] for role in roles] for k in range(most)]
-    tasks = tuple(_renamed(task, {role: name for role, (name, _) in zip(roles, one, strict=True)}) for one in sets)
+    tasks = tuple(_with_parts(task, {role: name for role, (name, _) in zip(roles, one, strict=True)}) for one in sets)
     whole = dataclasses.replace(
         task, objects=(*task.objects, *added), goal=_any_of(task.goal, [t.goal for t in tasks], roles)
     )
@@ -120,7 +126,7 @@ def choices_of(task: Task, part: str, count: int) -> ModelChoices:
     )
 
 
-def _renamed(task: Task, names: Mapping[str, str]) -> Task:
+def _with_parts(task: Task, names: Mapping[str, str]) -> Task:
     """The task in which other objects have these parts."""
     at_home = {here: name for name, here in task.roles.items()}
     own = {at_home.get(role, role): name for role, name in names.items()}
@@ -138,6 +144,17 @@ def _of_the_other_grasping(task: Task) -> set[str]:
         models = [f"{category}/{name}" for name in library().get(category, ())]
         if models and models[0] not in friction:  # it has models of its own for friction
             found |= {name for name in models if (name in friction) != by_friction}
+    return found
+
+
+def _named(models: Sequence[str], category: str, pool: Sequence[str], task: Task) -> list[str]:
+    """Of these models those of a category. Raises EngineError: none is. UnknownNameError: one is not in the pool."""
+    found = [name.partition("/")[2] for name in models if name.partition("/")[0] == category]
+    for name in found:
+        if name not in pool:
+            raise UnknownNameError(f"model of {category} for {task.name}", name, pool)
+    if not found:
+        raise EngineError(f"randomize: objects: models = {list(models)}: none is a {category}, which {task.name} needs")
     return found
 
 

@@ -96,9 +96,10 @@ def _strip(episodes: Episodes, axis: str, number: int, act_of: ActOf, options: M
     """Images of one episode, from its start to its end."""
     from PIL import Image
 
-    env = axis_environment(episodes, axis, {**options, "worlds": 1, "engine": "native"})
+    part = next(one for one in episodes.parts(axis, number + 1) if number in one.numbers)
+    env = axis_environment(episodes, axis, part, {**options, "worlds": 1, "engine": "native"})
     act = act_of(env)
-    state = env.start_from(np.array([number]), [episodes.seeds[number]])
+    state = episodes.start(env, axis, part, [part.numbers.index(number)])
     images = [_image(env, state)]
     while not bool(np.asarray(state.done)[0]):
         state = env.step(state, act(state))

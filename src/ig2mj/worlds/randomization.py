@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import re
 import zlib
+from collections.abc import Mapping
 
 import jax
 import jax.numpy as jnp
@@ -53,12 +54,55 @@ class Randomization:
 
     def fields(self, key: UInt[Array, "W 2"]) -> ModelFields:
         """Of worlds whose episodes have these keys."""
+        values = self.values(key)
         found = {}
         if self.physics is not None:
-            found |= self._physics_fields(key)
+            variant = values["variant"]
+            found |= {name: jnp.asarray(getattr(self._masses, name))[variant] for name in MASSES}
+            found |= self._contact_fields(values)
         if self.materials is not None:
-            found |= self._material_fields(key)
+            found |= self._material_fields(values)
         return ModelFields(**found)
+
+    def fields_of(self, values: Mapping[str, Array]) -> ModelFields:
+        """Of worlds with these values, those of `values` or from a file. On the host."""
+        found = {}
+        if self.physics is not None:
+            factor = np.asarray(values["mass"], float)
+            of_body = np.where(self._mass_owner >= 0, factor[:, np.maximum(self._mass_owner, 0)], 1.0)
+            masses = with_masses(self._model, self._model.body_mass * of_body)
+            found |= {name: getattr(masses, name) for name in MASSES} | self._contact_fields(values)
+        if self.materials is not None:
+            found |= self._material_fields(values)
+        return ModelFields(**found)
+
+    def values(self, key: UInt[Array, "W 2"]) -> dict[str, Array]:
+        """What fields of the model of worlds whose episodes have these keys are made of: factors of objects (mass,
+        friction, damping, object_colour), of materials (material_colour), and which objects exchange their material."""
+        found, objects = {}, self._objects
+        if self.physics is not None:
+            found["variant"] = pick(key, "mass", VARIANTS)
+            found["mass"] = jnp.asarray(self._mass_factors, jnp.float32)[found["variant"]]
+            found["friction"] = factors(key, "friction", self.physics.friction, (objects,))
+            found["damping"] = factors(key, "damping", self.physics.damping, (objects,))
+        if self.materials is not None:
+            found["object_colour"] = factors(key, "object_colour", self.materials.colour, (objects + 1, 3))
+            found["material_colour"] = factors(key, "material_colour", self.materials.colour, (len(self._mat_rgba), 3))
+            exchanged = uniform(key, "exchanged", (objects + 1,)) < self.materials.textures
+            found["exchanged"] = jnp.where(exchanged, uniform(key, "material", (objects + 1,)), -1.0)
+        return found
+
+    def used(self) -> dict[str, np.ndarray]:
+        """Which entries of `values` change anything."""
+        found, objects = {}, np.arange(self._objects)
+        if self.physics is not None:
+            found["mass"] = np.isin(objects, self._mass_owner)
+            found["friction"] = np.isin(objects, self._geom_object)
+            found["damping"] = np.isin(objects, self._dof_object)
+        if self.materials is not None:
+            seen = np.isin(np.arange(self._objects + 1), self._look_object)
+            found |= {"object_colour": seen, "exchanged": seen, "material_colour": self._of_home}
+        return found
 
     def draw(self, key: UInt[Array, "W 2"]) -> Draw:
         """All else, of worlds whose episodes have these keys."""
@@ -83,22 +127,22 @@ class Randomization:
         hinged = np.isin(model.jnt_type, [int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)])
         self._dof_object = np.where(hinged, joint_object, -1)[model.dof_jntid]
         self._damping = np.array(model.dof_damping, np.float32)
-        self._masses = _mass_variants(model, tables, whole, self.physics.mass)
+        self._model = model
+        owner = np.where(np.append(tables.object_fixed, True)[tables.body_object], -1, whole[tables.body_object])
+        low, high = (math.log(value) for value in self.physics.mass)
+        rng = np.random.default_rng(VARIANT_SEED)
+        self._mass_owner = owner
+        self._mass_factors = np.exp(rng.uniform(low, high, (VARIANTS, self._objects)))
+        factor = np.where(owner >= 0, self._mass_factors[:, np.maximum(owner, 0)], 1.0)
+        self._masses = with_masses(model, model.body_mass * factor)
 
-    def _physics_fields(self, key: UInt[Array, "W 2"]) -> dict[str, Array]:
-        variant = jax.vmap(lambda k: jax.random.randint(k, (), 0, VARIANTS))(stream(key, "mass"))
-        masses = {name: jnp.asarray(getattr(self._masses, name))[variant] for name in MASSES}
-        friction = self._factors(key, "friction", self.physics.friction, self._geom_object)
-        damping = self._factors(key, "damping", self.physics.damping, self._dof_object)
-        return masses | {
+    def _contact_fields(self, values: Mapping[str, Array]) -> dict[str, Array]:
+        friction = _of_owner(values["friction"], self._geom_object)
+        damping = _of_owner(values["damping"], self._dof_object)
+        return {
             "geom_friction": self._friction * friction[:, :, None],
             "dof_damping": self._damping * damping,
         }
-
-    def _factors(self, key: UInt[Array, "W 2"], name: str, between: Range, owner: np.ndarray) -> Float[Array, "W n"]:
-        """A factor for each entry of a field: its object's; 1 where `owner` is -1."""
-        of_object = factors(key, name, between, (self._objects,))
-        return jnp.where(owner >= 0, of_object[:, np.maximum(owner, 0)], 1.0).astype(jnp.float32)
 
     # Materials.
 
@@ -111,23 +155,20 @@ class Randomization:
         kinds = [kind_of_material(model.material(m).name) for m in range(model.nmat)]
         self._kinds = [np.flatnonzero([kind == one for kind in kinds]) for one in dict.fromkeys(filter(None, kinds))]
 
-    def _material_fields(self, key: UInt[Array, "W 2"]) -> dict[str, Array]:
-        objects, of_object = self._objects, self._look_object
-        colour = factors(key, "object_colour", self.materials.colour, (objects + 1, 3))
+    def _material_fields(self, values: Mapping[str, Array]) -> dict[str, Array]:
+        of_object, colour = self._look_object, jnp.asarray(values["object_colour"])
         own = jnp.where((of_object >= 0)[:, None], colour[:, of_object], 1.0)
         own = jnp.concatenate([own, jnp.ones_like(own[..., :1])], axis=-1)
         plain = (self._rgba == UNCOLOURED).all(1)  # what a material colours
         rgba = jnp.where(plain[:, None], self._rgba, jnp.clip(self._rgba * own, 0.0, 1.0))
-        shade = factors(key, "material_colour", self.materials.colour, (len(self._mat_rgba), 3))
-        shade = jnp.where(self._of_home[:, None], shade, 1.0)
+        shade = jnp.where(self._of_home[:, None], jnp.asarray(values["material_colour"]), 1.0)
         shade = jnp.concatenate([shade, jnp.ones_like(shade[..., :1])], axis=-1)
-        exchanged = uniform(key, "exchanged", (objects + 1,)) < self.materials.textures
-        share, material = uniform(key, "material", (objects + 1,)), jnp.asarray(self._material)
-        found = jnp.broadcast_to(material, (key.shape[0], len(self._material)))
+        share, material = jnp.asarray(values["exchanged"]), jnp.asarray(self._material)
+        found = jnp.broadcast_to(material, (share.shape[0], len(self._material)))
         for kind in self._kinds:
-            number = jnp.minimum((share * len(kind)).astype(jnp.int32), len(kind) - 1)
+            number = jnp.clip((share * len(kind)).astype(jnp.int32), 0, len(kind) - 1)
             other = jnp.asarray(kind, jnp.int32)[number][:, of_object]
-            replaced = exchanged[:, of_object] & np.isin(self._material, kind) & (of_object >= 0)
+            replaced = (share >= 0)[:, of_object] & np.isin(self._material, kind) & (of_object >= 0)
             found = jnp.where(replaced, other, found)
         mat_rgba = jnp.clip(self._mat_rgba * shade, 0.0, 1.0)
         return {"geom_rgba": rgba, "mat_rgba": mat_rgba, "geom_matid": found.astype(jnp.int32)}
@@ -217,11 +258,6 @@ def _wholes(tables: SceneTables) -> np.ndarray:
     return np.append(np.where(tables.object_part_of >= 0, tables.object_part_of, own), -1)
 
 
-def _mass_variants(model: mujoco.MjModel, tables: SceneTables, whole: np.ndarray, between: Range) -> ModelFields:
-    """The fields of masses, [V, ...]."""
-    owner = np.where(np.append(tables.object_fixed, True)[tables.body_object], -1, whole[tables.body_object])
-    low, high = (math.log(value) for value in between)
-    rng = np.random.default_rng(VARIANT_SEED)
-    of_object = np.exp(rng.uniform(low, high, (VARIANTS, len(tables.object_names))))
-    factor = np.where(owner >= 0, of_object[:, np.maximum(owner, 0)], 1.0)
-    return with_masses(model, model.body_mass * factor)
+def _of_owner(of_object: Array, owner: np.ndarray) -> Float[Array, "W n"]:
+    """A factor for each entry of a field: its object's; 1 where `owner` is -1."""
+    return jnp.where(owner >= 0, jnp.asarray(of_object)[:, np.maximum(owner, 0)], 1.0).astype(jnp.float32)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from ig2mj.engine.model_fields import MASSES
@@ -46,9 +46,19 @@ class Objects(_Axis):
 
     Attributes:
       count: models of each object that an environment has in all its worlds; each costs memory.
+      models: names such as "steak/steak_02", in place of those of the environment's split; of the others none is taken.
     """
 
     count: int = 4
+    models: Sequence[str] = dataclasses.field(default_factory=tuple)
+
+    def __post_init__(self) -> None:
+        """Raises EngineError: a setting is none."""
+        object.__setattr__(self, "count", _number(dataclasses.fields(self)[0], self.count))
+        names = self.models
+        if isinstance(names, str) or not all(isinstance(name, str) and "/" in name for name in names):
+            raise EngineError(f"randomize: models = {names!r}: names such as 'steak/steak_02' (ig2mj objects list)")
+        object.__setattr__(self, "models", tuple(names))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,9 +177,6 @@ AXES: dict[str, type[_Axis]] = {
 }
 """Settings of each axis, in the order of `Randomize`."""
 
-UNFINISHED: frozenset[str] = frozenset()
-"""Axes that environments refuse."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Randomize:
@@ -224,8 +231,8 @@ class Randomize:
 
     @classmethod
     def every(cls) -> Randomize:
-        """All axes that environments take, with their usual settings."""
-        usual: dict[str, Any] = {name: kind() for name, kind in AXES.items() if name not in UNFINISHED}
+        """All axes with their usual settings."""
+        usual: dict[str, Any] = {name: kind() for name, kind in AXES.items()}
         return cls(**usual)
 
     def settings(self, axis: str) -> Any:
@@ -254,13 +261,6 @@ class Randomize:
     def as_dict(self) -> dict[str, Any]:
         """Its settings in plain values, for files; `of` reads them."""
         return {name: _plain(dataclasses.asdict(self.settings(name))) for name in self.axes}
-
-    def check_finished(self) -> None:
-        """Raises EngineError: an axis that is on is not built yet."""
-        for name in self.axes:
-            if name in UNFINISHED:
-                built = ", ".join(axis for axis in AXES if axis not in UNFINISHED)
-                raise EngineError(f"randomize: the axis {name} does not work yet ({built} do)")
 
 
 def _range(name: str, given: Any) -> Range:

@@ -107,7 +107,7 @@ class RobotStarts:
             )
         self.offsets = np.array(kept, np.float32)
         self._start = start
-        self._agents = self._coordinates(start)
+        self._agents = self._coordinates(start, self.offsets)
 
     def draw(self, key: UInt[Array, "W 2"]) -> Int[Array, "W"]:
         """Number of the pose of worlds whose episodes have these keys."""
@@ -122,11 +122,18 @@ class RobotStarts:
 
     def moved(self, rows: Pool, choice: Int[Array, "W"]) -> Pool:
         """Rows of the bare scene with the robot at these poses."""
+        return self._with(rows, [jnp.asarray(table)[choice] for table in self._agents])
+
+    def moved_by(self, rows: Pool, offsets: Float[np.ndarray, "W 3"]) -> Pool:
+        """`moved` with poses of their own. On the host."""
+        return self._with(rows, self._coordinates(self._start, offsets))
+
+    def _with(self, rows: Pool, tables: Sequence[Array]) -> Pool:
         physics = rows.physics
-        qpos, ctrl, pos, quat = (jnp.asarray(table)[choice] for table in self._agents)
+        qpos, ctrl, pos, quat = tables
 
         def spread(array: Array) -> Array:
-            return jnp.broadcast_to(jnp.asarray(array), (choice.shape[0], *np.shape(array)))
+            return jnp.broadcast_to(jnp.asarray(array), (qpos.shape[0], *np.shape(array)))
 
         agents = dataclasses.replace(jax.tree.map(spread, self._start), qpos=qpos, ctrl=ctrl)
         fields = physics.model_fields
@@ -229,10 +236,10 @@ class RobotStarts:
             found.append((there, faces, ball))
         return found
 
-    def _coordinates(self, start: AgentsPart) -> tuple[np.ndarray, ...]:
-        """qpos, ctrl of the agents' part, body_pos and body_quat with each pose."""
+    def _coordinates(self, start: AgentsPart, offsets: Float[np.ndarray, "n 3"]) -> tuple[np.ndarray, ...]:
+        """qpos, ctrl of the agents' part, body_pos and body_quat with each offset, [n, ...]."""
         tables = []
-        for offset in self.offsets:
+        for offset in offsets:
             qpos, ctrl = np.array(start.qpos, np.float32), np.array(start.ctrl, np.float32)
             pos, quat = np.array(self._model.body_pos, np.float32), np.array(self._model.body_quat, np.float32)
             for root, (there, faces, ball) in zip(self._roots, self._placed(offset), strict=True):

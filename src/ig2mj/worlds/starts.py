@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -37,7 +37,8 @@ class Choices:
     """What is chosen from tables of a scene, of every world; None: the axis is off.
 
     Attributes:
-      object_poses: row of the start states that differ in poses. models: number of the choice. robot_start: of the pose.
+      object_poses: row of the start states that differ in poses.
+      models: number of the choice. robot_start: of the pose.
     """
 
     object_poses: Int[Array, "W"] | None = None
@@ -114,15 +115,18 @@ class Starts:
             return self.bare_rows(row), Draw()
         return self.chosen(row, key, self.choices(row, key))
 
-    def choices(self, row: Int[Array, "W"], key: UInt[Array, "W 2"]) -> Choices:
-        """What episodes with these keys choose from tables, for rows of the pool."""
+    def choices(self, row: Int[Array, "W"], key: UInt[Array, "W 2"], also: Pool | None = None) -> Choices:
+        """What episodes with these keys choose from tables, for rows of the pool. `also`: a pool of as many rows, with
+        which models and the robot's poses must be possible, too; on the host."""
         poses = models = robot = None
         if self.poses is not None:
             row = poses = pick(key, "object_poses", self.poses.size)
         if self._swaps is not None:
-            models = self._swaps.fitted(self._swaps.draw(key), row, self._fits)
+            fits = self._fits if also is None else self._fits & self._swaps.fits(also)
+            models = self._swaps.fitted(self._swaps.draw(key), row, fits)
         if self.robot_starts is not None:
-            robot = self.robot_starts.fitted(self.robot_starts.draw(key), row, self._reach)
+            reach = self._reach if also is None else self._reach & self.robot_starts.reach(also)
+            robot = self.robot_starts.fitted(self.robot_starts.draw(key), row, reach)
         return Choices(poses, models, robot)
 
     def chosen(self, row: Int[Array, "W"], key: UInt[Array, "W 2"], choices: Choices) -> tuple[Pool, Draw]:
@@ -140,6 +144,30 @@ class Starts:
             assert self.robot_starts is not None
             rows = self.robot_starts.moved(rows, robot)
             draw = dataclasses.replace(draw, robot_start=jnp.asarray(self.robot_starts.offsets)[robot])
+        return rows, draw
+
+    def with_values(
+        self, row: Int[np.ndarray, "W"], values: Mapping[str, Array], models: Int[np.ndarray, "W"] | None = None
+    ) -> tuple[Pool, Draw]:
+        """Rows of the pool with values that were drawn elsewhere. On the host.
+
+        Args:
+          values: those of `Randomization.values` and of `Draw`, of the axes that are on.
+          models: numbers of the choices.
+        """
+        fields = self.randomization.fields_of(values)
+        rows = self.bare_rows(row)
+        rows = dataclasses.replace(rows, physics=dataclasses.replace(rows.physics, model_fields=fields))
+        named = {f.name for f in dataclasses.fields(Draw)} & values.keys()
+        draw = self._usual(Draw(**{name: jnp.asarray(values[name]) for name in named}), len(row))
+        if models is not None:
+            assert self._swaps is not None
+            rows = self._swaps.swapped(rows, jnp.asarray(models))
+            draw = dataclasses.replace(draw, models=self._swaps.models(jnp.asarray(models)))
+        if self.robot_starts is not None:
+            offsets = np.asarray(values["robot_start"], np.float32)
+            rows = self.robot_starts.moved_by(rows, offsets)
+            draw = dataclasses.replace(draw, robot_start=jnp.asarray(offsets))
         return rows, draw
 
     @functools.cached_property

@@ -24,7 +24,7 @@ def chosen_episodes(task: str, given: pathlib.Path | None) -> Episodes:
 def check_episodes(axes: str, count: int | None, episodes: Episodes) -> tuple[tuple[str, ...], int]:
     """Names of axes, and episodes of each; a line on stderr where the file has fewer than asked for."""
     names, requested = parse_axes(axes), COUNT if count is None else count
-    if axes.strip() == ALL:  # of the axes that can be played now those that the file has
+    if axes.strip() == ALL:  # those that the file has
         names = tuple(name for name in names if name in episodes.axes)
     if requested > episodes.count:
         print(f"warning: --episodes {requested}: the file has {episodes.count} episodes", file=sys.stderr)

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from ig2mj.engine.grasp_release import moved_grasps, without_moved
-from ig2mj.engine.model_fields import MOVING, NAMES
+from ig2mj.engine.model_fields import MOVING, NAMES, POSES
 from ig2mj.engine.native.one_world import NativeWorld
 from ig2mj.engine.native.sleep import wake_trees
 from ig2mj.engine.native.view_rows import Changed
@@ -49,8 +49,8 @@ def apply_write(world: NativeWorld, rows: dict[str, np.ndarray]) -> int:
     fields = {name: rows[name] for name in NAMES if name in rows}
     if "eq_data" in fields:
         joined |= (world.fields["eq_data"] != fields["eq_data"]).any(1) & data.eq_active.astype(bool)
-    if any((world.fields[name] != array).any() for name, array in fields.items() if name in MOVING[1:]):
-        trees[:] = True
+    changed = {name for name, array in fields.items() if name in MOVING[1:] and (world.fields[name] != array).any()}
+    trees[:] |= bool(changed)
     if fields:
         world.set_fields(**fields)
     filtered = "ignored_contacts" in rows and bool((world.ignored != rows["ignored_contacts"]).any())
@@ -66,7 +66,7 @@ def apply_write(world: NativeWorld, rows: dict[str, np.ndarray]) -> int:
     mujoco.mj_step1(model, data)
     if not rows and (moved := _moved_by_hand(world)) is not None:
         return apply_write(world, _released(world, moved))
-    return world.clear_force() | world.refresh()
+    return world.clear_force() | world.refresh(everything=not changed.isdisjoint(POSES))
 
 
 def _with_releases(world: NativeWorld, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

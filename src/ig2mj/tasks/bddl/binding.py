@@ -21,7 +21,7 @@ from ig2mj.predicates import find, logic
 from ig2mj.predicates.logic import Atom
 from ig2mj.scene.additions import name_additions
 from ig2mj.scene.extras import ATTACHED, BROKEN, ON_FIRE, PREFIX, attached_as_text
-from ig2mj.scene.library import LibraryModel, library
+from ig2mj.scene.library import LibraryModel, library, split_models
 from ig2mj.scene.manifest import Manifest, ObjectEntry
 from ig2mj.scene.substance_requests import substances_as_text
 from ig2mj.tasks.bddl.matching import clusters_of, match, search_rooms
@@ -330,7 +330,12 @@ def _library_models(
     Args:
       choose: `max` takes the largest model of each category, `min` the smallest; None: the first.
     """
-    found = [list(models.values()) for c in known.categories if (models := library().get(c))]
+    others = split_models()
+    found = [
+        [model for name, model in models.items() if name not in others.get(c, ())]
+        for c in known.categories
+        if (models := library().get(c))
+    ]
     first = [m[0] if choose is None else choose(m, key=lambda model: _room(model.entry)) for m in found]
     models = [m for m in first if not m.entry.fixed and fits(m.entry)]
     if choose is not None:

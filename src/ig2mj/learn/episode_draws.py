@@ -1,0 +1,161 @@
+"""Values that were drawn for the episodes of a file, so that they stay when the code that draws changes.
+
+    values = EpisodeDraws.drawn(environments, episodes)
+    state = values.start(env, "lights", [0, 1], seeds)
+
+Of each episode: the models of the task's objects, lights, cameras, the strength of noise, the wording, and where each
+robot starts. Factors of objects and materials (`Randomization.values`) come in `SETS` sets, of which episode k has set
+k % SETS: there are hundreds of them.
+
+Axes: N episodes, S sets.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.errors import EngineError
+from ig2mj.worlds.random_streams import episode_keys
+
+SETS = 64
+"""Sets of factors of objects and materials."""
+
+FACTORS = ("mass", "friction", "damping", "object_colour", "material_colour", "exchanged")
+"""Values that come in sets."""
+
+PLAIN = ("light_colour", "light_quat", "camera_pos", "camera_quat", "camera_slope", "noise", "instruction")
+"""Values of each episode, fields of `Draw`."""
+
+OF_AXIS = {
+    "physics": ("mass", "friction", "damping"),
+    "materials": ("object_colour", "material_colour", "exchanged"),
+    "lights": ("light_colour", "light_quat"),
+    "camera": ("camera_pos", "camera_quat", "camera_slope"),
+    "sensor_noise": ("noise",),
+    "instructions": ("instruction",),
+}
+"""Values of each axis of `ig2mj.Randomize`; robots' starts and models are told apart by robot and name."""
+
+
+@dataclasses.dataclass(frozen=True)
+class EpisodeDraws:
+    """See the module's text.
+
+    Attributes:
+      arrays: [S, ...] of `FACTORS`, [N, ...] of `PLAIN`. robots: [N, 3] of each robot: `Draw.robot_start`.
+      models: [N][R] names of the models of the objects that vary; (): none do.
+    """
+
+    arrays: Mapping[str, np.ndarray]
+    robots: Mapping[str, np.ndarray]
+    models: Sequence[Sequence[str]] = ()
+
+    def values(self, axes: Sequence[str], numbers: Sequence[int], robot: str = "") -> dict[str, np.ndarray]:
+        """Of some episodes and axes, in single precision."""
+        found, rows = {}, np.asarray(numbers, int)
+        for name in (name for axis in axes for name in OF_AXIS.get(axis, ())):
+            if name in self.arrays:
+                own = self.arrays[name][rows % SETS if name in FACTORS else rows]
+                found[name] = own if own.dtype.kind in "iu" else own.astype(np.float32)
+        if "robot_start" in axes and robot in self.robots:
+            found["robot_start"] = self.robots[robot][rows].astype(np.float32)
+        return found
+
+    def start(self, env: Environment, rows: Sequence[int], numbers: Sequence[int], seeds: Sequence[int]) -> EnvState:
+        """All worlds of an environment at the start of these episodes.
+
+        Args:
+          env: with the axes that vary. rows: of its pool. numbers: of the episodes. seeds: theirs, for what is drawn
+            in the course of an episode.
+
+        Raises:
+          EngineError: the file lacks a model of the environment's, or the other way round.
+        """
+        starts, randomize = env.core.starts, env.config.randomize
+        if randomize is None or not self.arrays:  # of files without values everything follows from the seeds
+            return env.start_from(np.asarray(rows), list(seeds))
+        values = self.values(randomize.axes, numbers, env.robot)
+        if "robot_start" in randomize.axes and "robot_start" not in values:  # a robot that the file does not know
+            zero = np.zeros(len(rows), np.int32)
+            choice = starts.choices(np.asarray(rows, np.int32), episode_keys(np.array(seeds, np.int32), zero, zero))
+            assert starts.robot_starts is not None and choice.robot_start is not None
+            values["robot_start"] = starts.robot_starts.offsets[np.asarray(choice.robot_start)]
+        models = self._choices(env, numbers) if "objects" in randomize.axes else None
+        made, draw = starts.with_values(np.asarray(rows, np.int32), values, models)
+        return env.start_with(made, draw, np.asarray(rows), list(seeds))
+
+    def _choices(self, env: Environment, numbers: Sequence[int]) -> np.ndarray:
+        known = model_names(env)
+        found = []
+        for number in numbers:
+            names = tuple(self.models[number]) if self.models else ()
+            if names not in known:
+                raise EngineError(f"episode {number} is with {', '.join(names) or 'no models'}, which the file lacks")
+            found.append(known.index(names))
+        return np.array(found, np.int32)
+
+    @classmethod
+    def drawn(cls, envs: Mapping[str, Environment], seeds: Sequence[int], again: Any = None) -> EpisodeDraws:
+        """What the seeds of episodes say.
+
+        Args:
+          envs: of each robot, with all axes, their pools with a row for each episode. again: a second pool of start
+            states on which models and robots' starts must be possible as well.
+        """
+        first = next(iter(envs.values()))
+        numbers, zero = np.arange(len(seeds)), np.zeros(len(seeds), np.int32)
+        keys, made = episode_keys(np.array(seeds, np.int32), zero, zero), first.core.starts.randomization
+        values, used = jax.device_get(made.values(keys[:SETS])), made.used()
+        draw = jax.device_get(made.draw(keys))
+        arrays = {}
+        for name in FACTORS:
+            if name in values:
+                usual = -1.0 if name == "exchanged" else 1.0
+                keep = used[name].reshape(-1, *[1] * (values[name].ndim - 2))
+                arrays[name] = np.where(keep, values[name], usual).astype(np.float16)
+        for name in PLAIN:
+            array = getattr(draw, name)
+            if array is not None:
+                whole = np.asarray(array)
+                arrays[name] = whole.astype(np.int32 if whole.dtype.kind in "iu" else np.float16)
+        robots, models = {}, ()
+        for robot, env in envs.items():
+            starts, axes = env.core.starts, env.config.randomize.axes if env.config.randomize else ()
+            choice = starts.choices(numbers.astype(np.int32), keys, again)
+            if choice.robot_start is not None:
+                assert starts.robot_starts is not None
+                robots[robot] = starts.robot_starts.offsets[np.asarray(choice.robot_start)].astype(np.float32)
+            if env is first and "objects" in axes:
+                known = model_names(env)
+                models = [list(known[int(k)]) for k in np.asarray(choice.models)]
+        return cls(arrays, robots, models)
+
+
+def model_names(env: Environment) -> list[tuple[str, ...]]:
+    """ "category/model" of the objects of each choice of an environment whose objects vary."""
+    entries = {entry.name: f"{entry.category}/{entry.model}" for entry in env.scene.manifest.objects}
+    objective = getattr(env.objective, "base", env.objective)
+    return [tuple(entries[name] for name in names) for names in objective.swaps.names]
+
+
+def described_draw(values: Mapping[str, np.ndarray], names: Sequence[str]) -> dict[str, Any]:
+    """The values of one episode for people. `values`: of `EpisodeDraws.values`. `names`: of the scene's objects."""
+    found: dict[str, Any] = {}
+    for name, array in values.items():
+        one = np.asarray(array)[0]
+        if name in ("mass", "friction", "damping"):
+            found[name] = {names[k]: round(float(f), 3) for k, f in enumerate(one[: len(names)]) if f != 1.0}
+        elif name == "object_colour":
+            changed = [k for k, rgb in enumerate(one[: len(names)]) if (rgb != 1.0).any()]
+            found[name] = {names[k]: one[k].astype(float).round(3).tolist() for k in changed}
+        elif name == "exchanged":
+            found[name] = {names[k]: round(float(f), 3) for k, f in enumerate(one[: len(names)]) if f >= 0}
+        else:
+            found[name] = one.astype(float).round(4).tolist() if one.dtype.kind == "f" else one.tolist()
+    return found
