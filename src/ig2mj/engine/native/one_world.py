@@ -11,7 +11,7 @@ import numpy as np
 from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.controls import LARGEST, clip
 from ig2mj.engine.layout import ModelLayout
-from ig2mj.engine.model_fields import ModelFields, given
+from ig2mj.engine.model_fields import POSES, ModelFields, given
 from ig2mj.engine.native.contacts import FINGER, LINK, NOTHING_MET, ForcePlan, Met, StepContacts, touching_units
 from ig2mj.engine.native.lazy_fields import RAW, AgentContacts, LazyPlan, agents_touching, of_owners
 from ig2mj.engine.native.model_slot import ModelSlot
@@ -244,8 +244,8 @@ class NativeWorld:
         """Takes a snapshot without the world axis, and refreshes everything."""
         self.wrong_controls, self.lost = False, ""
         model, data = self.model, self.data
-        mujoco.mj_resetData(model, data)
         self.set_fields(eq_data=np.asarray(snapshot.eq_data), **given(snapshot.model_fields))
+        mujoco.mj_resetData(model, data)  # where bodies without joints are is computed here alone
         self.ignore(np.asarray(snapshot.agents.ignored_contacts))
         state = {name: snapshot.whole(name) for name in _STATE}
         self._set_state(state, float(snapshot.time))
@@ -257,7 +257,8 @@ class NativeWorld:
         self.units = np.array(snapshot.scene.touching, bool)
         known = np.array(snapshot.agents.touching, bool)
         self.agent_contacts = AgentContacts(known, np.zeros_like(known), *self._no_contacts)
-        return self.clear_force() | self.refresh(everything=True)
+        changed = self.clear_force() | self.refresh(everything=True)
+        return Changed.ALL if POSES[0] in self.fields else changed  # also of what never moves otherwise
 
     def _set_state(self, state: Mapping[str, Array], time: float) -> None:
         for name, array in state.items():

@@ -66,7 +66,9 @@ def apply_write(world: NativeWorld, rows: dict[str, np.ndarray]) -> int:
     mujoco.mj_step1(model, data)
     if not rows and (moved := _moved_by_hand(world)) is not None:
         return apply_write(world, _released(world, moved))
-    return world.clear_force() | world.refresh(everything=not changed.isdisjoint(POSES))
+    if not changed.isdisjoint(POSES):  # poses of bodies without joints are only computed from the start
+        return world.load(world.save())
+    return world.clear_force() | world.refresh()
 
 
 def _with_releases(world: NativeWorld, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
