@@ -34,10 +34,10 @@ def test_goals_are_about_whichever_model_is_in_use():
 
 
 def test_all_objects_of_a_task_change_together_and_begin_again():
-    chosen = choices_of(ACTIVITIES["SlicingFruit"], "train", 4)
+    chosen = choices_of(variant(ACTIVITIES["SlicingFruit"], 0, "physical"), "train", 4)
     assert chosen.roles == ("apple_0", "carving_knife_0")
-    assert len(chosen.names) == 4 and chosen.models[3][0] == chosen.models[0][0]
-    assert len({knife for _, knife in chosen.models}) == 4
+    assert len(chosen.names) == 4 and chosen.models[3][1] == chosen.models[0][1]
+    assert len({apple for apple, _ in chosen.models}) == 4 and len({knife for _, knife in chosen.models}) == 3
 
 
 def test_models_of_the_parts_are_others_where_a_category_is_divided():

@@ -140,7 +140,7 @@ class EpisodeDraws:
 def model_names(env: Environment) -> list[tuple[str, ...]]:
     """ "category/model" of the objects of each choice of an environment whose objects vary."""
     entries = {entry.name: f"{entry.category}/{entry.model}" for entry in env.scene.manifest.objects}
-    objective = getattr(env.objective, "base", env.objective)
+    objective: Any = getattr(env.objective, "base", env.objective)
     return [tuple(entries[name] for name in names) for names in objective.swaps.names]
 
 

@@ -271,7 +271,7 @@ def make_episodes(task: str, count: int = COUNT, grasping: str | None = None) ->
     axes = _possible(task, grasping)
     options: dict[str, Any] = {"grasping": grasping, "engine": "native", "split": f"{HELD_OUT}:objects"}
     envs = {robot: make(task, robot=robot, pool_size=count, randomize=axes, **options) for robot in known.robots}
-    plain = make(task, pool_size=count, **{**options, "split": HELD_OUT})
+    plain = make(task, pool_size=count, grasping=grasping, engine="native", split=HELD_OUT)
     pool = _bare(pool_of(base, HELD_OUT, count), plain.scene.digest)
     seeds = tuple(SEED + k for k in range(pool.size))
     poses = _repeated(_bare(spread_starts(base, HELD_OUT, pool.size), plain.scene.digest), pool.size)
@@ -305,7 +305,7 @@ def _possible(task: str, grasping: str | None) -> dict[str, Any]:
     for axis, kind in AXES.items():
         if axis in ("objects", "robot_start"):
             try:
-                env = make(task, grasping=grasping, engine="native", pool_size=1, randomize=[axis])
+                env = make(task, grasping=grasping, engine="native", pool_size=1, randomize={axis: True})
                 env.core.starts.no_draw(1)
             except EngineError:
                 continue
