@@ -76,6 +76,9 @@ def show(
             print(f"  {name}: {pose['pos']} m, {pose['quat']}")
         for name, value in start["states"].items():
             print(f"  {name}: {value}")
+        if not start["draws"]:
+            print("what is drawn follows from the seed (format 1)")
+            return 0
         print("drawn, each for its axis and for all together:")
         for name, value in start["draws"].items():
             print(f"  {name}: {value}")
