@@ -13,12 +13,13 @@ from lerobot.scripts.lerobot_eval import rollout
 HUB = pathlib.Path(__file__).parents[3] / "hub" / "env.py"
 
 
-class Resting:
+class Resting(torch.nn.Module):
     """A policy of LeRobot's that does nothing."""
 
     config = type("Config", (), {"device": "cpu"})()
 
     def __init__(self, size: int):
+        super().__init__()
         self._size, self.tasks = size, []
 
     def reset(self):
