@@ -12,7 +12,16 @@ from ig2mj.envs.rollout import play
 from ig2mj.errors import EngineError, InputError, PolicyServerError, UnknownNameError
 from ig2mj.learn.axes import AxisResult, axis_environment, evaluate_axes
 from ig2mj.learn.episode_draws import OF_AXIS, SETS, EpisodeDraws
-from ig2mj.learn.episodes import AXES, EVERY, Episodes, find_episodes, make_episodes, parse_axes, shipped_episodes
+from ig2mj.learn.episodes import (
+    AXES,
+    EVERY,
+    FORMAT_VERSION,
+    Episodes,
+    find_episodes,
+    make_episodes,
+    parse_axes,
+    shipped_episodes,
+)
 
 
 def test_names_of_axes_are_checked():
@@ -55,13 +64,10 @@ def test_factors_come_in_sets_and_all_else_is_of_the_episode():
 
 
 def test_shipped_episodes_have_every_axis_and_values_of_each():
-    """Or are of format 1, whose values follow from the seeds."""
     files = {name: Episodes.load(file) for name, file in shipped_episodes().items()}
     assert files["CookingMeat"].count == 200
     for name, episodes in files.items():
-        if episodes.header["format_version"] == 1:
-            assert not episodes.draws.arrays and not episodes.homes and "object_poses" not in episodes.axes, name
-            continue
+        assert episodes.header["format_version"] == FORMAT_VERSION, name
         assert set(EVERY) - set(episodes.axes) <= {"homes"}, name
         assert ("homes" in episodes.axes) == bool(episodes.homes), name
         drawn = {field for axis in AXES for field in OF_AXIS.get(axis, ())}
