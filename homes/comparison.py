@@ -1,7 +1,8 @@
 """Whether homes that were converted here are those that ship: `python -m ig2mj_homes.comparison MADE SHIPPED`.
 
 Files are equal byte for byte. Numbers of MJCF and manifests may differ by `SAME`: loose objects are let down in a
-simulation when a home is converted, and contacts round differently on different kinds of processor.
+simulation when a home is converted, and contacts round differently on different kinds of processor. An orientation of
+MJCF that rounds to none may be written or left out.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ SAME = 1e-4
 
 MEASURED = "engine_profile*.json"
 """Files next to the scenes that are measured, not converted."""
+
+QUAT = re.compile(r' quat="([^"]*)"')
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])")
 
@@ -42,10 +45,17 @@ def differences(made: pathlib.Path, shipped: pathlib.Path) -> tuple[list[str], l
 
 def greatest_gap(one: str, other: str) -> float | None:
     """The largest difference between corresponding numbers of two texts; None: they differ in more than numbers."""
+    one, other = (QUAT.sub(_turned, text) for text in (one, other))
     if NUMBER.sub("#", one) != NUMBER.sub("#", other):
         return None
     pairs = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
     return max((abs(float(a) - float(b)) for a, b in pairs), default=0.0)
+
+
+def _turned(quat: re.Match[str]) -> str:
+    """An orientation of MJCF; nothing where it is none, which MuJoCo writes if it is not exactly so."""
+    w, *axis = map(float, quat[1].split())
+    return "" if abs(abs(w) - 1.0) < SAME and all(abs(x) < SAME for x in axis) else quat[0]
 
 
 def main() -> int:

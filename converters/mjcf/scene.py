@@ -81,7 +81,11 @@ def build_scene(
         )
         build.elements[placement.name] = elements
         build.start_joints |= _start_joints(placement, assembly, elements)
-        ag = placement.instance.kind == "object" and (assisted_grasp or {}).get(placement.instance.category, True)
+        ag = (
+            placement.instance.kind == "object"
+            and not placement.instance.fixed
+            and (assisted_grasp or {}).get(placement.instance.category, True)
+        )
         build.entries.append(
             object_entry(
                 placement.name,

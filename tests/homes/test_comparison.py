@@ -23,6 +23,8 @@ def home(folder: pathlib.Path, scene: str = SCENE, **files: str) -> pathlib.Path
         (SCENE, [], []),
         (SCENE.replace("0.90123456", "0.90120156"), [], ["birch/scene.xml: numbers differ by up to 3.3e-05"]),
         (SCENE.replace("0.90123456", "0.9"), ["birch/scene.xml: differs, numbers by up to 0.0012"], []),
+        (SCENE.replace(' quat="1 0 0 1e-07"', ""), [], ["birch/scene.xml: numbers differ by up to 0"]),
+        (SCENE.replace("1 0 0 1e-07", "0.7071 0 0 0.7071"), ["birch/scene.xml: differs"], []),
         (SCENE.replace("apple_0", "apple_1"), ["birch/scene.xml: differs"], []),
     ],
 )
