@@ -16,6 +16,7 @@ from ..base.description import ROBOT_CATEGORY, Inertial, Joint, Link, Mimic, Obj
 from ..base.file_access import FileGuard
 from ..base.transforms import read_origin
 from ..base.xml_reader import Element, is_huge, number, numbers, read_xml, where
+from .mesh_files import FORMATS
 from .urdf_geometry import GeometryReader
 from .urdf_leftovers import read_leftovers, warn_of_degrees, warn_of_macros
 from .urdf_materials import UrdfMaterials
@@ -55,6 +56,9 @@ def read_urdf(
     simplified = path.with_name(f"{path.stem}_simplified{path.suffix}")
     if inputs.is_file(simplified):
         path = simplified
+    if path.suffix.lower() in FORMATS:
+        fix = f'write a URDF that names it: <mesh filename="{path.name}"/> in <visual> and <collision>'
+        raise InputError(file, "is a mesh, not a URDF", fix=fix)
     warnings: list[str] = []
     robot = read_xml(path, "robot", warnings)
     read_leftovers(robot, warnings)

@@ -82,7 +82,7 @@ def test_an_error_of_ig2mj_itself_is_status_1_and_no_traceback(command, capsys):
     [
         ("train --num-envs 8", "there is no option --num-envs; the option is --worlds"),
         ("rollout --env CookingMeat", "ENV is positional, as in `ig2mj rollout ENV`"),
-        ("convert --urdf x.urdf", "(a URDF: `ig2mj convert object FILE`,"),
+        ("convert --urdf x.urdf", "(a URDF: `ig2mj convert object --urdf FILE`,"),
         ("inspect x.urdf", "is a URDF, not a converted scene"),
         ("states small_home --set toggeld_on=stove_0", "near matches: toggled_on\n"),
     ],

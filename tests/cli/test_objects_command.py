@@ -5,6 +5,7 @@ import json
 import typing
 
 import pytest
+from own_objects import CUP
 
 from ig2mj import cli
 from ig2mj.cli.common.hand import with_hand
@@ -107,3 +108,26 @@ def test_a_hand_and_states_that_are_set_come_into_the_changed_home(tiny_home_fol
     assert with_hand(scene, tiny_home_folder)[0].removed == scene.removed
     home = _home(str(tiny_home_folder), None, ("open=cabinet",), None, 1, "native", ("remove:table",))
     assert "table" not in [o.name for o in home.scene.manifest.objects]
+
+
+def test_an_object_says_which_part_of_its_category_it_has_joined(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("ig2mj.cli.objects._write_image", lambda model, file: None)
+    (tmp_path / "beaker.urdf").write_text(CUP)
+    convert = ("convert", "object", "--urdf", tmp_path / "beaker.urdf", "--category", "mug", "--no-report")
+    into = ("--out", tmp_path / "mine" / "beaker", "--split", "held_out")
+    assert call(capsys, *convert, "--fixed", *into)[2].startswith("error: --split held_out: models of furniture")
+    assert "'mug/mug_00' ships" in call(capsys, *convert, "--model", "mug_00", *into)[2]
+    assert not (tmp_path / "mine").exists()
+    assert call(capsys, *convert, *into)[0] == 0
+    assert "  split      held_out\n" in call(capsys, "objects", "show", tmp_path / "mine" / "beaker")[1]
+    assert call(capsys, "objects", "add", tmp_path / "mine")[0] == 0
+    (found,) = json.loads(call(capsys, "objects", "list", "--own", "--json")[1])
+    assert found["name"] == "mug/beaker" and found["split"] == "held_out"
+
+
+def test_a_mesh_that_is_given_as_a_urdf_is_answered_with_what_to_write(capsys, tmp_path):
+    (tmp_path / "steak.obj").write_text("v 0 0 0\n")
+    status, _, err = call(
+        capsys, "convert", "object", "--urdf", tmp_path / "steak.obj", "--category", "steak", "--out", tmp_path / "out"
+    )
+    assert status == 2 and 'is a mesh, not a URDF (write a URDF that names it: <mesh filename="steak.obj"/>' in err

@@ -70,7 +70,7 @@ def test_a_number_of_steps_is_given_by_name(tiny_home):
 def test_a_urdf_in_the_place_of_a_robot_or_a_scene_is_named_as_such():
     with pytest.raises(EngineError, match=r"UrdfRobot.load\('x.urdf'\), on the command line --robot-urdf x.urdf"):
         ig2mj.make(TASK, robot="x.urdf")
-    with pytest.raises(InputError, match="`ig2mj convert object FILE`"):
+    with pytest.raises(InputError, match="`ig2mj convert object --urdf FILE`"):
         ig2mj.load_scene("x.urdf")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -51,6 +53,8 @@ def test_models_of_the_user_join_a_part_of_their_category(tmp_path, monkeypatch)
     mine = LibraryModel("carving_knife", "mine", tmp_path, own=True)
     join_split(tmp_path, "held_out")
     monkeypatch.setattr("ig2mj.scene.model_splits.own_library", lambda: {"carving_knife": {"mine": mine}})
+    entry = SimpleNamespace(fixed=False)
+    monkeypatch.setattr(LibraryModel, "entry", entry)
     models, joined = models_with_parts("carving_knife")
     assert models[-1] == "mine" and joined == {"mine": "held_out"}
     assert "mine" in models_of(models, "held_out", joined) and "mine" not in models_of(models, "train", joined)
@@ -59,6 +63,9 @@ def test_models_of_the_user_join_a_part_of_their_category(tmp_path, monkeypatch)
         models_with_parts("carving_knife")
     with pytest.raises(UnknownNameError, match="near matches: train"):
         join_split(tmp_path, "trian")
+    (tmp_path / SPLIT_FILE).write_text('{"split": "held_out"}')
+    entry.fixed = True
+    assert "mine" not in models_with_parts("carving_knife")[0]
 
 
 def test_only_activities_have_models():

@@ -234,7 +234,9 @@ def _nested(
         return 0 if rest else 2
     sub = new_subcommand(name, rest[0], renamed or {})
     if sub not in subcommands and any(arg.lower().endswith(".urdf") for arg in rest):
-        words = [f"`ig2mj {name} {known} FILE`" for known in ("object", "robot", "scene") if known in subcommands]
+        words = [
+            f"`ig2mj {name} {known} --urdf FILE`" for known in ("object", "robot", "scene") if known in subcommands
+        ]
         if words:
             print(f"error: '{sub}' is not a command of 'ig2mj {name}' (a URDF: {', '.join(words)})", file=sys.stderr)
             return 2

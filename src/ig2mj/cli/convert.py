@@ -93,7 +93,8 @@ def convert_object(
       category: its category in iGibson's taxonomy (apple, fridge, ...), which decides its abilities.
       out: output folder; an earlier result there is replaced once the conversion succeeds.
       model: name of the object; default: the file's name.
-      split: the part of its category that it joins, train or held_out (docs/guide/randomization.md).
+      split: the part of its category that it joins, train or held_out, once its folder is in a library of yours
+        (`ig2mj objects add DIR`, docs/guide/randomization.md).
       fixed: it is furniture: in a home it stands where it is put for good, and nothing moves it.
       annotations: TOML file with its abilities, thresholds and functional parts, such as a button or a heat source
         (docs/guide/objects.md).
@@ -103,10 +104,10 @@ def convert_object(
     """
     from ig2mj_converters.conversion import convert_object as convert
 
-    from ig2mj.scene.model_splits import check_part, join_split
+    from ig2mj.scene.model_splits import check_joins, join_split
 
     if split is not None:
-        check_part(split)
+        check_joins(split, category, model or urdf.stem, fixed)
 
     options = options_of(common, default_jobs=os.cpu_count() or 1, mesh_root=mesh_root, package_path=package_path)
     with _progress(f"converting {urdf.name}") as options_with:

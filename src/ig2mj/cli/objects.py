@@ -42,9 +42,7 @@ def list_objects(
         which = f" with '{word}' in category, name or ability" if word else ""
         print(f"no objects{which} (`ig2mj objects add DIR` adds a library of your own)")
     else:
-        rows = [
-            [m.reference, _size(m), f"{m.entry.mass:.3g}", _does(m), str(m.folder) if m.own else "ships"] for m in found
-        ]
+        rows = [[m.reference, _size(m), f"{m.entry.mass:.3g}", _does(m), _where(m)] for m in found]
         columns = ["name", "size (m)", "> kg", "abilities, [links]", "?where"]
         console = stdout_console()
         console.print(make_table("Objects for --object NAME", columns, rows, console.width))
@@ -142,11 +140,22 @@ def _size(model: LibraryModel) -> str:
     return " x ".join(f"{v:.2f}" for v in model.entry.bounding_box)
 
 
+def _where(model: LibraryModel) -> str:
+    from ig2mj.scene.model_splits import part_of
+
+    if not model.own:
+        return "ships"
+    part = part_of(model)
+    return str(model.folder) if part is None else f"{model.folder} ({part})"
+
+
 def _does(model: LibraryModel) -> str:
     return ", ".join([*model.entry.abilities, *(f"[{kind}]" for kind in model.entry.links)])
 
 
 def _facts(model: LibraryModel) -> dict[str, Any]:
+    from ig2mj.scene.model_splits import part_of
+
     entry = model.entry
     return {
         "name": model.reference,
@@ -155,6 +164,7 @@ def _facts(model: LibraryModel) -> dict[str, Any]:
         "synset": entry.synset,
         "folder": str(model.folder),
         "own": model.own,
+        "split": part_of(model),
         "fixed": entry.fixed,
         "size": list(entry.bounding_box),
         "mass": entry.mass,
@@ -174,6 +184,8 @@ def _bottom(model: LibraryModel) -> float:
 
 
 def _description(model: LibraryModel) -> list[str]:
+    from ig2mj.scene.model_splits import part_of
+
     entry = model.entry
     kind = "fixed where it is put" if entry.fixed else "can be moved"
     ways = "" if entry.assisted_grasp or entry.fixed else ", assisted grasping does not hold it"
@@ -183,6 +195,8 @@ def _description(model: LibraryModel) -> list[str]:
         f"  files      {model.folder}",
         f"  size       {_size(model)} m, {entry.mass:.3g} kg; upright, it reaches {above:.3f} m below its frame",
     ]
+    if (part := part_of(model)) is not None:
+        lines.append(f"  split      {part}")
     for joint in entry.joints:
         limits = "continuous" if joint.range is None else f"{joint.range[0]:.3g} to {joint.range[1]:.3g}"
         opens = ", opens it" if any(o.joint == joint.name for o in entry.openable) else ""

@@ -10,7 +10,7 @@ import pathlib
 
 import msgspec
 
-from ig2mj.errors import InputError, UnknownNameError
+from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.scene.library import LibraryModel, library, own_library
 
 SPLIT_FILE = "split.json"
@@ -23,6 +23,20 @@ def check_part(part: str) -> None:
     """Raises UnknownNameError: there is no such part; with near matches."""
     if part not in PARTS:
         raise UnknownNameError("split of models", part, PARTS)
+
+
+def check_joins(part: str, category: str, model: str, fixed: bool) -> None:
+    """Whether a model that is to be converted may join a part of its category.
+
+    Raises:
+      UnknownNameError: there is no such part. EngineError: it is furniture, of which episodes never take another model;
+      or a model that ships has its name.
+    """
+    check_part(part)
+    if fixed:
+        raise EngineError(f"--split {part}: models of furniture do not vary between episodes (leave --split out)")
+    if model in library().get(category, ()):
+        raise EngineError(f"--split {part}: '{category}/{model}' ships (name yours with --model NAME)")
 
 
 def join_split(folder: str | os.PathLike, part: str) -> None:
@@ -45,7 +59,7 @@ def part_of(model: LibraryModel) -> str | None:
 
 
 def models_with_parts(category: str) -> tuple[list[str], dict[str, str]]:
-    """Models of a category, those of the user's own libraries last; and the parts that these were given."""
-    own = own_library().get(category, {})
+    """Models of a category, the movable ones of the user's own libraries last; and the parts that these were given."""
+    own = {name: model for name, model in own_library().get(category, {}).items() if not model.entry.fixed}
     joined = {name: part for name, model in own.items() if (part := part_of(model)) is not None}
     return [*library().get(category, {}), *own], joined

@@ -20,7 +20,7 @@ SHIPPED_HOMES = next(
 finds them by their bare names."""
 
 _URDF = (
-    "`ig2mj convert object FILE` converts an object, `ig2mj convert scene` a scene; "
+    "`ig2mj convert object --urdf FILE` converts an object, `ig2mj convert scene` a scene; "
     "`ig2mj view SCENE --robot-urdf FILE` shows a robot"
 )
 
