@@ -10,7 +10,9 @@ from own_objects import CUP
 from ig2mj import cli
 from ig2mj.cli.common.hand import with_hand
 from ig2mj.cli.common.objects import AddedObjects, load_home
+from ig2mj.cli.objects import _description
 from ig2mj.cli.web import _home
+from ig2mj.scene.library import find_model
 
 pytestmark = pytest.mark.usefixtures("own_configuration")
 
@@ -54,6 +56,11 @@ def test_an_object_is_shown_with_its_abilities(capsys, cup):
     found = json.loads(out)
     assert status == 0 and found["category"] == "mug" and found["name"] == str(cup)
     assert found["abilities"]["stainable"] == {"stained_threshold": 0.5}
+
+
+def test_only_an_object_that_can_move_is_shown_with_a_predicate_as_its_place(capsys):
+    for name, place in (("mug", "on_top:OBJECT"), ("shelf/shelf_14", "X,Y,Z,YAW")):
+        assert _description(find_model(name))[-1].endswith(f"@{place}")
 
 
 @pytest.mark.parametrize("expected", ["mgu", "obj/nothing", "mug/mug_99"])

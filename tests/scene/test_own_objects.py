@@ -181,6 +181,12 @@ def test_two_models_of_one_name_in_libraries_are_refused_with_both_folders(shelf
         find_model("mug/cup")
 
 
+def test_objects_of_a_library_within_another_count_once(shelf_of_cups, own_configuration):
+    own_libraries.add_library(shelf_of_cups / "kitchen")
+    own_libraries.add_library(shelf_of_cups)
+    assert list(own_library()["mug"]) == ["cup"]
+
+
 def test_a_folder_without_objects_is_no_library(tmp_path):
     (tmp_path / "empty").mkdir()
     for name in ("empty", "absent"):

@@ -109,10 +109,12 @@ def add(folder: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(meta
     except Exception:
         remove_library(path)
         raise
-    names = [m.reference for models in shelves.values() for m in models.values() if m.folder in found]
+    models = [m for of_category in shelves.values() for m in of_category.values() if m.folder in found]
+    names = [m.reference for m in models]
     count = f"{len(names)} object{'s' * (len(names) != 1)}"
     print(f"{path}: {count} ({', '.join(names[:8])}{', ...' * (len(names) > 8)}), kept in {registry_file()}")
-    print(f"try: ig2mj view small_home --object {names[0]}@on_top:breakfast_table_0")
+    first = next((m for m in models if not m.entry.fixed), models[0])
+    print(f"try: ig2mj view small_home --object {first.reference}@{_place(first, 'breakfast_table_0')}")
     return 0
 
 
@@ -183,6 +185,11 @@ def _bottom(model: LibraryModel) -> float:
     return round(entry.bounding_box[2] / 2 - entry.base_link_offset[2], 4)
 
 
+def _place(model: LibraryModel, support: str) -> str:
+    """How `--object` can place it: predicates cannot place what is fixed."""
+    return "X,Y,Z,YAW" if model.entry.fixed else f"on_top:{support}"
+
+
 def _description(model: LibraryModel) -> list[str]:
     from ig2mj.scene.model_splits import part_of
 
@@ -207,7 +214,11 @@ def _description(model: LibraryModel) -> list[str]:
     lines += [f"  link       {kind} ({'a point' if link.site else 'a box'})" for kind, link in entry.links.items()]
     if entry.parts:
         lines.append(f"  halves     {', '.join(part.object for part in entry.parts)}")
-    return [*lines, f"  hash       {model.sha256[:12]}", f"  add it     --object {model.reference}@on_top:OBJECT"]
+    return [
+        *lines,
+        f"  hash       {model.sha256[:12]}",
+        f"  add it     --object {model.reference}@{_place(model, 'OBJECT')}",
+    ]
 
 
 def _write_image(model: LibraryModel, file: pathlib.Path) -> None:
@@ -231,4 +242,4 @@ def _write_sheet(models: list[LibraryModel], file: pathlib.Path) -> None:
             report(k, len(models), model.reference)
             scenes.append((f"{model.reference} {_size(model)}", load_scene(model.folder)))
         library_image(scenes).save(file)
-    print(f"wrote {file} ({len(models)} objects)")
+    print(f"wrote {file} ({len(models)} object{'s' * (len(models) != 1)})")

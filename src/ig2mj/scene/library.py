@@ -128,18 +128,19 @@ def own_library() -> dict[str, dict[str, LibraryModel]]:
       InputError: a library cannot be read, or two models have the same category and name.
     """
     found: dict[str, dict[str, LibraryModel]] = {}
-    for root in own_libraries.libraries():
-        for folder in own_libraries.object_folders(root):
-            model = read_model(folder)
-            models = found.setdefault(model.category, {})
-            other = models.get(model.model) or library().get(model.category, {}).get(model.model)
-            if other is not None:
-                raise InputError(
-                    folder,
-                    f"is '{model.category}/{model.model}', as is {other.folder}",
-                    fix="convert it with another --model NAME, or leave its library out (`ig2mj objects remove DIR`)",
-                )
-            models[model.model] = model
+    # a library may hold another one, whose objects count once
+    folders = [f.resolve() for root in own_libraries.libraries() for f in own_libraries.object_folders(root)]
+    for folder in dict.fromkeys(folders):
+        model = read_model(folder)
+        models = found.setdefault(model.category, {})
+        other = models.get(model.model) or library().get(model.category, {}).get(model.model)
+        if other is not None:
+            raise InputError(
+                folder,
+                f"is '{model.category}/{model.model}', as is {other.folder}",
+                fix="convert it with another --model NAME, or leave its library out (`ig2mj objects remove DIR`)",
+            )
+        models[model.model] = model
     return found
 
 
