@@ -134,7 +134,7 @@ def test_a_fixed_base_stays(folder, home):
 @pytest.mark.parametrize(
     ("layout", "error", "said"),
     [
-        ({"arm": ["sholder_pan"]}, UnknownNameError, "near matches: shoulder_pan"),
+        ({"arm": ["sholder_pan"]}, UnknownNameError, r"joint of the robot \(.*arm\) .* near matches: shoulder_pan"),
         ({"camera": "camra_link"}, UnknownNameError, "camera_link"),
         ({"whels": []}, UnknownNameError, "wheels"),
         (

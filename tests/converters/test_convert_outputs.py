@@ -298,6 +298,20 @@ def test_what_is_no_output_of_ours_is_never_overwritten(kind, tmp_path):
     assert "years of work" in (out if kind == "file" else out / "chapter1.tex").read_text()
 
 
+def test_a_robot_is_not_overwritten_by_an_object_nor_an_object_by_a_home(tmp_path, capsys):
+    (tmp_path / "rover").mkdir()
+    for name in ("manifest.json", "object.xml", "robot.json"):
+        (tmp_path / "rover" / name).write_text("{}")
+    words = ["--urdf", str(tmp_path / "cup.urdf"), "--out", str(tmp_path / "rover")]
+    assert call(["convert", "object", *words, "--category", "cup"]) == 2
+    assert "rover: --out: holds a robot, and is not overwritten" in capsys.readouterr().err
+    (tmp_path / "rover" / "robot.json").unlink()
+    assert call(["convert", "robot", *words]) == 2
+    assert "rover: --out: holds an object" in capsys.readouterr().err
+    assert call(["convert", "scene", "--dataset", str(tmp_path), "--scene", "x", *words[2:]]) == 2
+    assert "rover: --out: holds an object" in capsys.readouterr().err
+
+
 def test_the_seed_chooses_random_models_and_the_same_seed_the_same(own, convert):
     shutil.copytree(own / "objects" / "pot_plant" / "pl0", own / "objects" / "pot_plant" / "pl1")
     (own / "objects" / "pot_plant" / "pl1" / "pl0.urdf").rename(own / "objects" / "pot_plant" / "pl1" / "pl1.urdf")

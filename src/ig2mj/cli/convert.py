@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from ig2mj.cli.common.conversion import DEFAULTS, Common, Flag, options_of
+from ig2mj.cli.common.conversion import DEFAULTS, Common, Flag, check_kind, options_of
 from ig2mj.cli.convert_dataset import convert_dataset
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def convert_scene(
     """
     from ig2mj_converters.conversion import convert_scene as convert
 
+    check_kind(out, "home")
     options = options_of(
         common,
         fixed_furniture=fixed_furniture,
@@ -106,6 +107,7 @@ def convert_object(
 
     from ig2mj.scene.model_splits import check_joins, join_split
 
+    check_kind(out, "robot" if category == "agent" else "object")
     if split is not None:
         check_joins(split, category, model or urdf.stem, fixed)
 
@@ -171,6 +173,7 @@ def convert_robot(
         raise InputError(file, f"is not what {option} takes", fix=f"{other} FILE")
     if layout is not None and not layout.is_file():
         raise InputError(layout, "is not a file", element="--layout", fix="name a TOML or JSON file")
+    check_kind(out, "robot")
     kept = own_layout(out)
     former = None if kept is None or layout is not None else (kept.name, kept.read_bytes())
     options = options_of(common, default_jobs=os.cpu_count() or 1, mesh_root=mesh_root, package_path=package_path)

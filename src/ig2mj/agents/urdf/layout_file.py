@@ -55,20 +55,20 @@ def check_entries(robot: Description, given: Mapping[str, Any], where: str) -> N
                 what = "links" if name == "suction" else "joints"
                 raise InputError(where, f"must be a list of names of {what}", element=name)
             if name == "suction":
-                _check_names("link of the robot", value, list(robot.frames))
+                _check_names("link", name, value, list(robot.frames), where)
             else:
-                _check_names("joint of the robot", value, [joint.name for joint in robot.joints])
+                _check_names("joint", name, value, [joint.name for joint in robot.joints], where)
         elif name == "start":
             if not isinstance(value, Mapping) or not all(_is_number(v) for v in value.values()):
                 raise InputError(where, "must be a table of numbers by joint", element=name)
-            _check_names("joint of the robot", list(value), [joint.name for joint in robot.joints])
+            _check_names("joint", name, list(value), [joint.name for joint in robot.joints], where)
         elif name == "mount":
             if not _is_number(value) or not 0 <= value <= MAX_MOUNT:
                 raise InputError(where, f"must be 0 to {MAX_MOUNT:g} m", element=name)
         elif not isinstance(value, str):
             raise InputError(where, "must be a text", element=name)
         elif name in LINKS and value:
-            _check_names("link of the robot", [value], list(robot.frames))
+            _check_names("link", name, [value], list(robot.frames), where)
         elif name in ("base", "closed") and value not in (choices := BASES if name == "base" else CLOSED):
             raise InputError(
                 where, f"is '{value}'", element=name, fix=f"use {', '.join(choices[:-1])} or {choices[-1]}"
@@ -98,7 +98,7 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= MAX_POSITION
 
 
-def _check_names(kind: str, names: Sequence[str], known: Sequence[str]) -> None:
+def _check_names(kind: str, entry: str, names: Sequence[str], known: Sequence[str], where: str) -> None:
     for name in names:
         if name not in known:
-            raise UnknownNameError(kind, name, known)
+            raise UnknownNameError(f"{kind} of the robot ({where}: {entry})", name, known)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pathlib
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
@@ -81,6 +82,18 @@ def options_of(common: Common, *, default_jobs: int = 1, **of_command: Any) -> C
         view=None if common.no_report else _free_view,
         **of_command,
     )
+
+
+def check_kind(out: pathlib.Path, kind: Literal["home", "object", "robot"]) -> None:
+    """Raises InputError: `out` holds a result of another kind, which the conversion would replace."""
+    from ig2mj.errors import InputError
+
+    kinds: dict[str, str] = {"scene.xml": "home", "robot.json": "robot", "object.xml": "object"}
+    held = next((kinds[name] for name in kinds if (out / name).is_file()), kind)
+    if held != kind:
+        article = "an" if held == "object" else "a"
+        problem = f"holds {article} {held}, and is not overwritten by another kind of output ({kind})"
+        raise InputError(out, problem, element="--out", fix="name a new or empty folder")
 
 
 def _render(*arguments: Any, **options: Any) -> Any:
