@@ -30,6 +30,8 @@ BULLET_MARGIN = 0.001
 """m: what Bullet adds to each side of a mesh's box."""
 MIN_MASS = 1e-3
 """kg: what a moving body without mass is given; MuJoCo refuses none."""
+EDGE = 0.01
+"""Share of an object's size by which its centre of mass should at least lie inside of its box."""
 MIN_RADIUS = 0.01
 """m: size of a body that has mass and no shape."""
 TINY = 1e-3
@@ -212,6 +214,8 @@ def _kept(link: Link, given: Inertial, members: Sequence[str], model: ObjectMode
     """
     if given.mass == 0:
         return Inertial(0.0, np.zeros((3, 3)), given.pose.copy())
+    if len(model.links) == 1 and (edge := _off_centre(link, given)):
+        model.warnings.append(f"link '{link.name}': {edge}")
     problem = "impossible inertia in the URDF"
     if is_possible(given.inertia):
         problem = _too_wide(link, given, members, model)
@@ -242,6 +246,22 @@ def _too_wide(link: Link, given: Inertial, members: Sequence[str], model: Object
     if radius <= half:
         return ""
     return f"implausible inertia in the URDF (radius of gyration {radius:.2g} m for a {2 * half:.2g} m link)"
+
+
+def _off_centre(link: Link, given: Inertial) -> str:
+    """What is wrong with a centre of mass on the surface of the link's box, or outside of it; else ''.
+
+    Relations such as on_top look up and down from there, so that a support right below is not seen.
+    """
+    boxes = [b for shape in link.collisions if (b := shape_bounds(shape, np.eye(4))) is not None]
+    if not boxes:
+        return ""
+    com, low, high = given.pose[:3, 3], np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+    edge = EDGE * (high - low)
+    if np.all(com >= low + edge) and np.all(com <= high - edge):
+        return ""
+    where = " ".join(f"{v:.3g}" for v in com)
+    return f"the centre of mass ({where}) is not inside of the shape: give <inertial> its <origin>"
 
 
 def is_possible(inertia: np.ndarray) -> bool:

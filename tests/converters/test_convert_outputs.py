@@ -129,6 +129,18 @@ def test_a_plain_urdf_keeps_its_masses_and_needs_no_dataset(tmp_path):
     assert model.geom_type[wheel] == mujoco.mjtGeom.mjGEOM_CYLINDER
 
 
+@pytest.mark.parametrize(("origin", "warned"), [("", True), ('<origin xyz="0 0 0.05"/>', False)])
+def test_a_centre_of_mass_on_the_surface_is_a_warning(tmp_path, capsys, origin, warned):
+    (tmp_path / "cup.urdf").write_text(
+        f'<robot name="cup"><link name="body"><inertial>{origin}<mass value="0.3"/><inertia ixx="4e-4" iyy="4e-4" '
+        'izz="4e-4" ixy="0" ixz="0" iyz="0"/></inertial><collision><origin xyz="0 0 0.05"/><geometry>'
+        '<box size="0.07 0.07 0.1"/></geometry></collision></link></robot>'
+    )
+    words = ["--urdf", str(tmp_path / "cup.urdf"), "--category", "cup", "--no-report", "--out", str(tmp_path / "out")]
+    assert call(["convert", "object", *words]) == 0
+    assert ("centre of mass (0 0 0) is not inside of the shape" in capsys.readouterr().out) == warned
+
+
 def test_a_missing_model_is_exit_2_and_all_of_them_are_named(own, tmp_path, capsys):
     shutil.rmtree(own / "objects" / "stove")
     shutil.rmtree(own / "objects" / "bed" / "bed0")

@@ -179,6 +179,17 @@ def files(monkeypatch, tmp_path):
             del sys.modules[name]
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("states=[3]", "StateSpec, not 3"), ("commands={'view': print}", "'view' is taken")],
+)
+def test_a_file_whose_registration_is_refused_is_named(files, capsys, text, said):
+    (files / "mine.py").write_text(f"import ig2mj\n\nig2mj.register({text})\n")
+    assert cli.call(["--plugin", str(files / "mine.py"), "plugins"]) == 2
+    err = capsys.readouterr().err
+    assert f"plug-in {files / 'mine.py'}: " in err and said in err and err.count("\n") == 1
+
+
 def test_a_file_is_a_plug_in_of_one_command(files, capsys):
     (files / "mine.py").write_text(
         "import ig2mj\n\ndef hello(name: str = 'you') -> None:\n    '''Greet.'''\n    print('hello', name)\n\n"

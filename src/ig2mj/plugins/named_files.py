@@ -69,15 +69,15 @@ def import_file(file: pathlib.Path) -> ModuleType:
 
 def _import(word: str) -> None:
     expected = "a Python file or module that calls ig2mj.register is expected"
+    if word.endswith(".py") and not pathlib.Path(word).is_file():
+        raise PluginError(f"plug-in {word}: there is no such file; {expected} ({VARIABLE} names it)")
     try:
         if word.endswith(".py"):
-            if not pathlib.Path(word).is_file():
-                raise PluginError(f"plug-in {word}: there is no such file; {expected} ({VARIABLE} names it)")
             import_file(pathlib.Path(word))
         else:
             importlib.import_module(word)
-    except PluginError:
-        raise
+    except PluginError as e:
+        raise PluginError(f"plug-in {word}: {e}") from e
     except (Exception, SystemExit) as e:
         why = f"{type(e).__name__}: {e}"
         raise PluginError(f"plug-in {word} cannot be imported: {why}; {expected} ({VARIABLE} names it)") from e
