@@ -16,7 +16,6 @@ GOAL = "(on_top apple pan)"
         (["(on_top apple"], "close every bracket"),
         ([], "give a goal"),
         ([GOAL, "--robot", "turtlebot"], "a robot without hands cannot change a household"),
-        ([GOAL, "--robot", "fetch", "--rung", "kinematic"], "motion of the hands of robot 'fetch' cannot be planned"),
         ([GOAL, "--robot", "humanid"], "no robot is named 'humanid'; near matches: humanoid"),
         ([GOAL, "--split", "held"], "no split is named 'held'; near matches: held_out"),
         ([GOAL, "--seconds", "0"], "--seconds 0: must be above 0"),

@@ -145,7 +145,7 @@ def test_point_links_have_no_geometry_and_blades_are_boxes(root: pathlib.Path):
 def test_halves_lie_beside_their_whole(root: pathlib.Path):
     """The halves' category is the whole's."""
     wholes = [m for m in models(root, "apple") if "object_parts" in metadata(m)]
-    assert len(wholes) == catalogue()["apple"].count
+    assert len(wholes) >= catalogue()["apple"].count
     for whole in wholes:
         for part in metadata(whole)["object_parts"]:
             assert part["category"] == "apple"

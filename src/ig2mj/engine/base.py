@@ -36,6 +36,9 @@ from ig2mj.process.gc_pause import Traced
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import SceneTables
 
+GATHERED = (1, 8, 64, 256, 1024)
+"""Numbers of worlds that `Engine.gather` is compiled for where it is compiled."""
+
 PHYSICS_TIMESTEP = 1 / 120
 """Seconds. iGibson's physics step."""
 
@@ -289,6 +292,19 @@ class Engine(Protocol):
 
     def export(self, physics: Physics, world: int) -> Snapshot:
         """One world as a snapshot without the world axis, in numpy arrays that share no memory with the engine."""
+        ...
+
+    def gather(self, physics: Physics, tree: Any, worlds: Sequence[int]) -> list[tuple[Snapshot, Any]]:
+        """Some worlds on the host.
+
+        Args:
+          physics: as returned by the last call.
+          tree: arrays [W, ...] that go with it.
+          worlds: their numbers.
+
+        Returns:
+          of each world a snapshot, as of `export`, and its rows of the tree [1, ...], in numpy arrays of their own.
+        """
         ...
 
     def load(self, physics: Physics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> Physics:

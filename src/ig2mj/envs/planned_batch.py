@@ -6,8 +6,8 @@
 
 All worlds take an agent step together, in one call. Programs of all worlds are followed in one batch on the host
 (`ig2mj.planning.execution`). A world whose program has ended is copied to the process that plans for it, holds still
-until the answer is there, and delays no other world. Copies of several worlds leave the device together, in batches of
-`SIZES`, so that nothing is compiled again.
+until the answer is there, and delays no other world. Copies of several worlds leave the device together
+(`Engine.gather`), in batches of `GATHERED`, so that nothing is compiled again.
 
 Axes: W worlds.
 """
@@ -18,13 +18,11 @@ import dataclasses
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
 
 import jax
 import numpy as np
 
-from ig2mj.engine.mjx.engine import MjxEngine
-from ig2mj.engine.snapshot import Snapshot
+from ig2mj.engine.base import GATHERED
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.planning_processes import PlanningProcesses
 from ig2mj.envs.planning_stage import EnvironmentStage
@@ -39,9 +37,6 @@ from ig2mj.planning.solver import EpisodeResult
 
 REFILL = 16
 """Share of the worlds, one in so many, whose episodes are over before they begin others: one call resets them all."""
-
-SIZES = (1, 8, 64, 256, 1024)
-"""Numbers of worlds that are copied together."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,7 +108,6 @@ class PlannedBatch:
         self.stage = EnvironmentStage(env)
         self.body = body_of(env.scene, self.stage.controller, 0)
         self.planners = PlanningProcesses(env, processes, seed)
-        self._rows: Callable[..., Any] = jax.jit(lambda tree, index: jax.tree.map(lambda a: a[index], tree))
 
     def run(
         self,
@@ -156,7 +150,7 @@ class PlannedBatch:
         """Compiles what a run needs, and waits until all processes can plan. Its time is not counted."""
         self.stage.observe(self.env.reset(0))
         count = self.env.num_worlds
-        for size in (s for s in SIZES if s <= max(count, 1)):
+        for size in (s for s in GATHERED if s <= max(count, 1)):
             self.copies(list(range(size)))
         self.stage.act(np.zeros((count, self.body.size), np.float32))
         self.stage.observe(self.env.reset(self.stage.state, np.ones(count, bool)))
@@ -169,24 +163,9 @@ class PlannedBatch:
 
     def copies(self, worlds: Sequence[int]) -> list[WorldCopy]:
         """Copies of some worlds, on the host."""
-        engine, world = self.env.core.engine, self.stage.state.batch.world
-        found: list[WorldCopy] = []
-        if not isinstance(engine, MjxEngine):
-            for w in worlds:
-                leaves = [np.array(a[w : w + 1]) for a in jax.tree.leaves(world.states)]
-                found.append(WorldCopy(engine.export(world.physics, w), leaves))
-            return found
-        for first in range(0, len(worlds), SIZES[-1]):
-            chosen = list(worlds[first : first + SIZES[-1]])
-            size = next(s for s in SIZES if s >= len(chosen))
-            index = np.array([*chosen, *[chosen[0]] * (size - len(chosen))], np.int32)
-            physics, states = jax.device_get(
-                (engine.export_rows(world.physics, index), self._rows(world.states, index))
-            )
-            for k in range(len(chosen)):
-                one: Snapshot = jax.tree.map(lambda a, k=k: np.array(a[k]), physics)
-                found.append(WorldCopy(one, [np.array(a[k : k + 1]) for a in jax.tree.leaves(states)]))
-        return found
+        world = self.stage.state.batch.world
+        gathered = self.env.core.engine.gather(world.physics, world.states, worlds)
+        return [WorldCopy(physics, jax.tree.leaves(states)) for physics, states in gathered]
 
     def close(self) -> None:
         """Ends the processes that plan; may be called twice."""

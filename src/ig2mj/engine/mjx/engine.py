@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
-from ig2mj.engine.base import Write
+from ig2mj.engine.base import GATHERED, Write
 from ig2mj.engine.controls import check_shape, clip
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
@@ -92,6 +92,7 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
         # One program each, not hundreds of little ones; and what several programs contain is traced once.
         self._first = Compiled(self._start_all)
         self._row = jax.jit(lambda physics, world: jax.tree.map(lambda a: a[world], self.snapshot(physics)))
+        self._rows = jax.jit(lambda tree, worlds: jax.tree.map(lambda a: a[worlds], tree))
         self._view, self._placed = jax.jit(self._make_view), jax.jit(self._kinematics)
         self._mapped = jax.jit(self._map, static_argnums=0)
 
@@ -263,9 +264,18 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
             raise EngineError(f"there is no world {world}: this engine has {self.num_worlds}")
         return jax.tree.map(np.array, self._row(fresh(physics), world))
 
-    def export_rows(self, physics: MjxPhysics, worlds: Int[np.ndarray, "k"]) -> Snapshot:
-        """Some worlds as a snapshot of k rows, on the device: one call for all of them. Compiled once for each k."""
-        return self._row(fresh(physics), worlds)
+    def gather(self, physics: MjxPhysics, tree: Any, worlds: Sequence[int]) -> list[tuple[Snapshot, Any]]:
+        """See `Engine.gather`: up to 1,024 worlds by one call and one transfer, compiled for each of `GATHERED`."""
+        found: list[tuple[Snapshot, Any]] = []
+        for first in range(0, len(worlds), GATHERED[-1]):
+            chosen = list(worlds[first : first + GATHERED[-1]])
+            size = next(s for s in GATHERED if s >= len(chosen))
+            index = np.array([*chosen, *[chosen[0]] * (size - len(chosen))], np.int32)
+            rows = jax.device_get((self._row(fresh(physics), index), self._rows(tree, index)))
+            for k in range(len(chosen)):
+                one = jax.tree.map(lambda a, k=k: np.array(a[k]), rows[0])
+                found.append((one, jax.tree.map(lambda a, k=k: np.array(a[k : k + 1]), rows[1])))
+        return found
 
     def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
         """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""

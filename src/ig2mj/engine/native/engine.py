@@ -254,6 +254,10 @@ class NativeEngine(HostExecution, SceneEngine):
         """One world as a snapshot in float64 numpy arrays of its own."""
         return self._live(physics).worlds[world].save()
 
+    def gather(self, physics: NativePhysics, tree: Any, worlds: Sequence[int]) -> list[tuple[Snapshot, Any]]:
+        """See `Engine.gather`."""
+        return [(self.export(physics, w), jax.tree.map(lambda a, w=w: np.array(a[w : w + 1]), tree)) for w in worlds]
+
     @functools.cached_property
     def _pieces(self) -> Pieces:
         return Pieces(self._slots[0].model, self.layout, self._statics.own_fields)
