@@ -40,6 +40,16 @@ def test_one_of_the_bare_scene_leaves_the_hand_at_its_start(full, bare):
     assert full.touches(view, "box", "table").all()
 
 
+def test_gathered_worlds_are_those_that_are_exported_one_by_one(full):
+    physics, _ = full.run(full.fresh(), 10, np.array([[0.2, 0, 0], [0, 0.1, 0]], np.float32))
+    tree = {"volume": np.arange(6, dtype=np.float32).reshape(2, 3)}
+    gathered = full.engine.gather(physics, tree, [1, 0, 1])
+    for world, (row, rows) in zip([1, 0, 1], gathered, strict=True):
+        assert_same(row, full.engine.export(physics, world))
+        np.testing.assert_array_equal(rows["volume"], tree["volume"][world : world + 1])
+    assert full.engine.gather(physics, tree, []) == []
+
+
 def test_its_agents_can_be_taken_away(full, bare):
     physics, _ = full.run(full.fresh(), 30)
     row = full.engine.export(physics, 0)
