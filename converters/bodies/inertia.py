@@ -78,6 +78,8 @@ def link_inertials(
         else:
             members = next(body for body in bodies.values() if name in body)
             result[name] = _kept(link, given[name], members, model, bullet)
+            if rule == "object" and len(model.links) == 1 and (edge := _off_centre(link, given[name])):
+                model.warnings.append(f"link '{name}': {edge}")
     _give_least_mass(model, bodies, result)
     return result
 
@@ -214,8 +216,6 @@ def _kept(link: Link, given: Inertial, members: Sequence[str], model: ObjectMode
     """
     if given.mass == 0:
         return Inertial(0.0, np.zeros((3, 3)), given.pose.copy())
-    if len(model.links) == 1 and (edge := _off_centre(link, given)):
-        model.warnings.append(f"link '{link.name}': {edge}")
     problem = "impossible inertia in the URDF"
     if is_possible(given.inertia):
         problem = _too_wide(link, given, members, model)

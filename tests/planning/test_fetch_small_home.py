@@ -18,7 +18,10 @@ def simulation():
     ("before", "requests"),
     [
         ((), "grasp carving_knife_0, slice apple_0 carving_knife_0"),
-        ((), "toggle_on stove_0, grasp fish_0, cook fish_0 stove_0, release fish_0, toggle_off stove_0"),
+        (
+            (("on_top", "fish_0", "coffee_table_0"),),  # on the stove it would be cooked before it is taken
+            "toggle_on stove_0, grasp fish_0, cook fish_0 stove_0, release fish_0, toggle_off stove_0",
+        ),
         ((), "grasp apple_0, place_on_top apple_0 coffee_table_0"),
         ((), "grasp hardback_0, place_under hardback_0 breakfast_table_0"),
         ((), "open bottom_cabinet_0, close bottom_cabinet_0, open stove_0"),
@@ -32,6 +35,7 @@ def test_fetch_does(simulation, before, requests):
     simulation.reset()
     for predicate, *arguments in before:
         assert simulation.set_predicate(predicate, *arguments)
+    assert not simulation.predicate("cooked", "fish_0")
     for request in requests.split(", "):
         outcome = simulation.agent.do(*request.split())
         assert outcome.done, f"{request}: {outcome}"
