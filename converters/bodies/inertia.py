@@ -78,7 +78,8 @@ def link_inertials(
         else:
             members = next(body for body in bodies.values() if name in body)
             result[name] = _kept(link, given[name], members, model, bullet)
-            if rule == "object" and len(model.links) == 1 and (edge := _off_centre(link, given[name])):
+            alone = rule == "object" and len(model.links) == 1 and given[name].mass > 0
+            if alone and (edge := _off_centre(link, given[name])):
                 model.warnings.append(f"link '{name}': {edge}")
     _give_least_mass(model, bodies, result)
     return result
