@@ -236,7 +236,7 @@ def main() -> int:
     parser.add_argument("--worlds", type=int, default=25, help="episodes of a part, side by side in one process")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--minutes", type=float, default=60.0, help="after which it ends with what it has")
-    parser.add_argument("--force", "--anew", action="store_true", help="play what has been played, too")
+    parser.add_argument("--force", action="store_true", help="play what has been played, too")
     parser.add_argument("--out", type=pathlib.Path, default=ROWS.parent)
     parser.add_argument("--table", action="store_true", help=f"only write the table of {PAGE.name}")
     parser.add_argument("--pools", action="store_true", help=argparse.SUPPRESS)

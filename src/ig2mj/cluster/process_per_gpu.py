@@ -21,7 +21,7 @@ GRACE = 90.0
 def visible_gpus(environ: Mapping[str, str]) -> list[str]:
     """The GPUs that programs of this machine may use, as CUDA_VISIBLE_DEVICES names them. CUDA is not started.
 
-    There are none where JAX is told to run elsewhere (JAX_PLATFORMS), or NVIDIA's `nvidia-smi` does not answer.
+    There are none where JAX_PLATFORMS names other platforms, or NVIDIA's `nvidia-smi` does not answer.
     """
     platforms = environ.get("JAX_PLATFORMS", "")
     if platforms and not {"cuda", "gpu"} & {name.strip() for name in platforms.split(",")}:

@@ -40,7 +40,7 @@ OF_AXIS = {
     "sensor_noise": ("noise",),
     "instructions": ("instruction",),
 }
-"""Values of each axis of `ig2mj.Randomize`; robots' starts and models are told apart by robot and name."""
+"""Values of each axis of `ig2mj.Randomize`; robots' starts and models are named by robot and object."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Memory that MuJoCo Warp leaves unwritten in data is zero, so that programs which hold data are found in caches.
 
-Programs of JAX contain the arrays they close over as constants. Memory that nobody wrote holds other numbers in each
+Programs of JAX contain the arrays they close over as constants. Unwritten memory holds other numbers in each
 process, so no cache of programs would recognise them.
 """
 
