@@ -115,7 +115,7 @@ def test_another_model_takes_the_place_in_the_row_and_the_first_waits_where_it_d
     scene = load_scene(task.home, objects=chosen.task.objects)
     rows = widened(pool_of(task, "train", 3), base, scene)
     swaps = chosen.swaps(scene)
-    assert swaps.fits(rows).shape == (3, 3)
+    assert swaps.fits(rows).shape == (3, 4)  # the models of `choices_of(..., 4)`
     after = jax.jit(swaps.swapped)(rows, jnp.array([0, 1, 2]))
     lows, places = [], []
     for row, name in enumerate(("steak_0", "steak_1", "steak_2")):

@@ -51,7 +51,7 @@ def test_base_and_hands_move_together_and_meet_nothing(robot):
     """The hand is where it was in the frame of the base; a pinned base has a pose of its own in each world."""
     worlds = 6
     env = ig2mj.make("GraspingBook", robot, worlds, "native", pool_size=worlds, randomize=["robot_start"])
-    usual = ig2mj.make("GraspingBook", robot, 1, "native", pool_size=1).start_from([0]).batch.world.view.agent
+    usual = ig2mj.make("GraspingBook", robot, 1, "native", pool_size=1).start_from(np.array([0])).batch.world.view.agent
     state = env.start_from(np.arange(worlds))
     agent, offset = state.batch.world.view.agent, np.asarray(state.draw.robot_start)
     assert np.ptp(offset, axis=0).min() > 0.02 and len(env.core.starts.robot_starts.offsets) == COUNT
