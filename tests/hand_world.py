@@ -253,8 +253,6 @@ class HandWorld:
             agent_joint_agent=np.zeros(0, int),
             agent_joint_qposadr=np.zeros(0, int),
             agent_joint_dofadr=np.zeros(0, int),
-            agent_joint_lower=np.zeros(0),
-            agent_joint_upper=np.zeros(0),
             actuator_agent=np.zeros(0, int),
             hand_body=np.zeros(agents, int),
             hand_agent=np.zeros(agents, int),
@@ -264,10 +262,6 @@ class HandWorld:
             graspable_body=np.flatnonzero([not t.fixed for t in things]) + 1,
             graspable_object=np.flatnonzero([not t.fixed for t in things]),
             graspable_joint=np.full(sum(not t.fixed for t in things), -1),
-            orientation_object=np.zeros(0, int),
-            orientation_quat=np.zeros((0, 4)),
-            orientation_prob=np.zeros(0),
-            orientation_size=np.zeros((0, 3)),
         )
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
 import mujoco
 import numpy as np
 
+from ig2mj.agents.base import Robot
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.scene.scene import Scene
+from ig2mj.sensors.base import SensorOptions
+from ig2mj.sensors.suite import SensorSuite
 from ig2mj.states.model import StateModel
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.rules import Rules
@@ -45,6 +49,22 @@ class OneWorld:
     def engine_step(self, ctrl: np.ndarray | None = None) -> None:
         """Physics and view alone, of the same world."""
         self.physics, self.view = self.engine.step(self.physics, None if ctrl is None else ctrl[None])
+
+    def with_images(self, robot: Robot, sensors: Sequence[str], size: int) -> Callable[[], None]:
+        """A control step and readings of a robot's sensors, with square images of `size` pixels a side.
+
+        robot: the first of the scene.
+        """
+        controller = robot.controller(self.scene.tables, 0)
+        options = SensorOptions(width=size, height=size)
+        suite = SensorSuite(self.engine, self.scene, self.model, controller, list(sensors), options)
+        state = controller.initial(1)
+
+        def step() -> None:
+            self.step()
+            suite.read(self.physics, self.view, self.states, state)
+
+        return step
 
     @property
     def mujoco(self) -> tuple[mujoco.MjModel, mujoco.MjData]:

@@ -27,8 +27,8 @@ from benchmarks.harness.paths import ROOT
 from benchmarks.sampling.behavior import expressible
 from benchmarks.sampling.behavior_page import write_page
 from ig2mj.errors import Ig2mjError
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.many import make_sampler, sample_row
-from ig2mj.sampling.placement import Budget
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder, shipped_homes
 from ig2mj.tasks.bddl.binding import Binding

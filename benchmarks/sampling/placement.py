@@ -32,9 +32,9 @@ import tyro
 
 import ig2mj
 from benchmarks.harness.results import RESULTS, save, table
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import read_conditions
 from ig2mj.sampling.many import make_sampler
-from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.row import RowSampler
 
 PREDICATES = ("on_top", "inside", "under", "on_floor", "next_to", "in_contact_with")

@@ -18,9 +18,9 @@ import tyro
 import ig2mj
 from benchmarks.harness.results import RESULTS, save, table
 from benchmarks.sampling.placement import BUDGET, request
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import Condition, read_conditions
 from ig2mj.sampling.many import make_sampler
-from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.row import RowSampler
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder

@@ -35,10 +35,11 @@ import ig2mj
 from benchmarks.harness.results import RESULTS, save, table
 from benchmarks.sampling.placement import BUDGET, requests
 from ig2mj.engine.snapshot import Snapshot
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import Condition, read_conditions
 from ig2mj.sampling.many import make_sampler
 from ig2mj.sampling.perturbation import loose_objects, perturb
-from ig2mj.sampling.placement import NOWHERE, Budget, Rejections
+from ig2mj.sampling.placement import NOWHERE, Rejections
 from ig2mj.sampling.settled import make_pool
 from ig2mj.scene.paths import shipped_homes
 from ig2mj.worlds.random_streams import episode_keys

@@ -37,8 +37,6 @@ from benchmarks.harness.homes import WORK, Home, made_homes, named_homes, shippe
 from benchmarks.harness.one_world import OneWorld
 from benchmarks.harness.timing import interleave, timed
 from ig2mj.agents.turtlebot import TurtleBot
-from ig2mj.sensors.base import SensorOptions
-from ig2mj.sensors.suite import SensorSuite
 from ig2mj.states.model import StateModel
 
 SIZE = 512
@@ -93,16 +91,7 @@ def measure(home: Home, args: Args, backend: str | None) -> dict[str, Any]:
     }
     blocks = {"mujoco": timed(world.bare().step), "ig2mj": timed(world.step)}
     if backend is not None:
-        controller = robot.controller(scene.tables, 0)
-        options = SensorOptions(width=SIZE, height=SIZE)
-        sensors = SensorSuite(world.engine, scene, world.model, controller, ["rgb", "depth"], options)
-        state = controller.initial(1)
-
-        def with_picture() -> None:
-            world.step()
-            sensors.read(world.physics, world.view, world.states, state)
-
-        blocks["ig2mj_rgbd"] = timed(with_picture)
+        blocks["ig2mj_rgbd"] = timed(world.with_images(robot, ["rgb", "depth"], SIZE))
     rates = interleave(blocks, 0.0, args.repeats, steps=LAST)
     return row | {"rates": {name: dataclasses.asdict(rate) for name, rate in rates.items()}}
 

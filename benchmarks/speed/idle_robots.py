@@ -33,8 +33,6 @@ from benchmarks.harness.homes import WORK, Home, made_homes, named_homes
 from benchmarks.harness.one_world import OneWorld
 from benchmarks.harness.timing import Block, interleave, timed
 from ig2mj.agents import Fetch, Humanoid, TurtleBot
-from ig2mj.sensors.base import SensorOptions
-from ig2mj.sensors.suite import SensorSuite
 from ig2mj.states.model import StateModel
 
 SIZE = 128
@@ -95,16 +93,7 @@ def measure(home: Home, robot: str | None, far: bool, args: Args, backend: str |
         "ig2mj": timed(world.step),
     }
     if agents and backend is not None:
-        controller = agents[0].controller(scene.tables, 0)
-        options = SensorOptions(width=SIZE, height=SIZE)
-        sensors = SensorSuite(world.engine, scene, world.model, controller, ["rgb"], options)
-        state = controller.initial(1)
-
-        def with_picture() -> None:
-            world.step()
-            sensors.read(world.physics, world.view, world.states, state)
-
-        blocks["ig2mj_rgb"] = timed(with_picture)
+        blocks["ig2mj_rgb"] = timed(world.with_images(agents[0], ["rgb"], SIZE))
     rates = interleave(blocks, args.seconds, args.rounds)
     return {
         "home": home.name,

@@ -10,15 +10,14 @@
 | `learner` | learner with simulator: CookingMeat from pixels, SAC, 2,048 worlds, 1,024 samples of an update |
 
 One process for each GPU. Worlds do not talk to each other, so that the processes of the simulator only begin together;
-those of a learner average gradients by one collective program (`ig2mj.learn.iteration`). A learner of several GPUs can
-run in several ways (`--ways`): `processes`; `moving`, the same with XLA's scratch memory wherever there is room, which
-`ig2mj train` on several devices keeps in place (`ig2mj.process.keep_scratch_in_place`); `graphs`, as `processes` with
-the exchange of gradients inside XLA's CUDA graphs; `together`, one process with all GPUs. With `--kernels` there is
-`apart`, too: one GPU, on which the worlds and the learning are two programs as they are on several. Rows of several
-GPUs and of `apart` tell the two's shares, and how long a process waits in the mean for the worlds of the slowest, which
-differs from iteration to iteration. Everything is made ready side by side, then measured one after the other while the
-rest waits. A speed is all the work over the slowest process's time. Every row says how many worlds overflowed or lost
-their numbers; a row with any does not count.
+those of a learner average gradients by one collective program (`ig2mj.learn.several_devices`). A learner of several
+GPUs can run in several ways (`--ways`): `processes`; `moving`, the same with XLA's scratch memory wherever there is
+room, which `ig2mj train` on several devices keeps in place (`ig2mj.process.keep_scratch_in_place`); `graphs`, as
+`processes` with the exchange of gradients inside XLA's CUDA graphs; `together`, one process with all GPUs. `--kernels`
+adds `apart`: one GPU, on which stepping and learning are two programs as they are on several. Rows of several GPUs and
+of `apart` report the shares of both, and the mean time that a process waits for the slowest one's worlds. All processes
+are prepared at the same time and measured one after the other. A speed is all the work divided by the slowest process's
+time. Every row counts worlds that overflowed or became non-finite; a row with any is invalid.
 """
 
 from __future__ import annotations

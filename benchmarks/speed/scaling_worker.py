@@ -111,9 +111,10 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
     from ig2mj.envs.registry import VECTORS
     from ig2mj.learn.algorithms import make_algorithm
     from ig2mj.learn.checkpoints import Checkpoints
-    from ig2mj.learn.iteration import AXIS, ManyDevices, OneDevice
+    from ig2mj.learn.iteration import OneDevice
     from ig2mj.learn.perception import Perception
     from ig2mj.learn.sac import SAC, SACConfig
+    from ig2mj.learn.several_devices import AXIS, ManyDevices
 
     worlds, count, moves = settings["worlds"], jax.device_count(), Moves()
     apart = count > 1 or settings["apart"]

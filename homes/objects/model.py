@@ -98,9 +98,6 @@ class HouseholdObject:
         cloud = np.concatenate([points + link.origin for link in self.links for points in link.hulls])
         return np.array([cloud.min(0), cloud.max(0)])
 
-    def hull_count(self) -> int:
-        return sum(len(link.hulls) for link in self.links)
-
 
 class ObjectBuilder:
     """What a family function fills.

@@ -49,9 +49,9 @@ def gradient(team: Team) -> dict:
     import numpy as np
     from small_envs import PointMass
 
-    from ig2mj.learn.iteration import AXIS, ManyDevices
     from ig2mj.learn.perception import Perception
     from ig2mj.learn.ppo import PPO, PPOConfig
+    from ig2mj.learn.several_devices import AXIS, ManyDevices
 
     config = PPOConfig(
         rollout_length=LENGTH, epochs=1, minibatches=1, actor_layers=(32, 32), critic_layers=(32, 32), lr=1e-3
@@ -86,9 +86,9 @@ def learn(team: Team, out: str, iterations: int, resume: bool, seconds: float = 
     import jax
     from small_envs import PointMass
 
-    from ig2mj.learn.iteration import AXIS
     from ig2mj.learn.perception import Perception
     from ig2mj.learn.sac import SAC, SACConfig
+    from ig2mj.learn.several_devices import AXIS
     from ig2mj.learn.train import Run, train
 
     devices = jax.devices()
@@ -111,9 +111,9 @@ def turns(team: Team) -> dict:
     from small_envs import PointMass
 
     from ig2mj.envs.registry import make
-    from ig2mj.learn.iteration import AXIS, ManyDevices
     from ig2mj.learn.perception import Perception
     from ig2mj.learn.ppo import PPO, PPOConfig
+    from ig2mj.learn.several_devices import AXIS, ManyDevices
     from ig2mj.tasks import pools
 
     sampled, sample = [], pools.make_pool

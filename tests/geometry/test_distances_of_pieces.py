@@ -14,18 +14,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ig2mj.geometry import gjk, hulls, poses
-from ig2mj.geometry.gjk import PosedPieces
+from ig2mj.geometry.gjk import Nearest, PosedPieces
 from ig2mj.scene.tables import PieceKind
 
 SEEDS = st.integers(0, 2**31)
 PAIRS = np.array(list(itertools.combinations(range(10), 2)))
 IDENTITY = np.array([1, 0, 0, 0], np.float32)
-piece_distance, point_distance = jax.jit(gjk.piece_distance), jax.jit(gjk.point_distance)
+piece_distance = jax.jit(gjk.piece_distance)
 signed_depth = jax.jit(hulls.signed_depth)
 
 
 def chosen(shapes, pos, quat, index) -> PosedPieces:
     return PosedPieces(shapes.kind[index], shapes.size[index], shapes.vertices[index], pos[index], quat[index])
+
+
+def point_distance(point: np.ndarray, piece: PosedPieces) -> Nearest:
+    """Distance of points from pieces, 0 inside: points are spheres without size."""
+    shape = point.shape[:-1]
+    kind, size = np.full(shape, PieceKind.SPHERE), np.zeros((*shape, 3), np.float32)
+    still = np.broadcast_to(IDENTITY, (*shape, 4))
+    return piece_distance(PosedPieces(kind, size, np.zeros((*shape, 1, 3), np.float32), point, still), piece)
 
 
 def ball(radius: float, x: float) -> PosedPieces:

@@ -16,16 +16,16 @@ sys.path.insert(0, str(Path(__file__).parent))
 from small_envs import PointMass
 
 from ig2mj.errors import EngineError
-from ig2mj.learn.iteration import AXIS, ManyDevices
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.sac import SAC, SACConfig
+from ig2mj.learn.several_devices import AXIS, ManyDevices
 
 SCRIPT = """
 import dataclasses, json, sys
 sys.path.insert(0, {folder!r})
 import jax, numpy as np
 from small_envs import PointMass
-from ig2mj.learn.iteration import AXIS
+from ig2mj.learn.several_devices import AXIS
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.ppo import PPO, PPOConfig
 from ig2mj.learn.sac import SAC, SACConfig

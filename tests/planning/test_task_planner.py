@@ -14,9 +14,9 @@ from ig2mj.planning.pddl import domain_pddl, problem_pddl
 from ig2mj.planning.steps import PRIMITIVES
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.predicates.host_queries import HostQueries
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import read_conditions
 from ig2mj.sampling.many import make_sampler
-from ig2mj.sampling.placement import Budget
 from ig2mj.states.model import StateModel
 
 

@@ -11,11 +11,11 @@ import ig2mj
 from ig2mj.agents import Fetch
 from ig2mj.envs.registry import find_task
 from ig2mj.errors import StateError
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.bystanders import MOVED, Bystanders
 from ig2mj.sampling.conditions import read_conditions
 from ig2mj.sampling.joints import JointMover
 from ig2mj.sampling.many import make_sampler, sample_row
-from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.tasks.pools import bare_scene
 from ig2mj.tasks.task import Task

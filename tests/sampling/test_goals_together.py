@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ig2mj.errors import StateError
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import order, read_conditions
 from ig2mj.sampling.many import make_sampler
-from ig2mj.sampling.placement import TILT, Budget, _tipped
+from ig2mj.sampling.orientations import TILT, tipped
 from ig2mj.sampling.rules import next_to
 from ig2mj.scene.scene import load_scene
 
@@ -111,7 +112,7 @@ def test_where_columns_allow_it_next_to_holds_of_many_places(sampler):
 def test_a_tipped_object_lies_on_another_side(seed, angle):
     upright = np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
     along = np.array([1.0, 0.0, 0.0, 0.0]) if seed % 2 else None
-    w, x, y, z = _tipped(upright, np.random.default_rng(seed), along)
+    w, x, y, z = tipped(upright, np.random.default_rng(seed), along)
     assert w * w + x * x + y * y + z * z == pytest.approx(1.0)
     up = 1 - 2 * (x * x + y * y)  # vertical part of what was the vertical axis
     assert abs(up) <= np.sin(TILT) + 1e-9

@@ -9,9 +9,10 @@ import pytest
 
 from ig2mj.errors import StateError, UnknownNameError
 from ig2mj.predicates.literals import ArityError
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import bind, order, read_conditions
 from ig2mj.sampling.many import make_sampler, sample
-from ig2mj.sampling.placement import RESTING_PENETRATION, Budget
+from ig2mj.sampling.placement import RESTING_PENETRATION
 from ig2mj.scene.scene import load_scene
 
 

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from inverses import grip_of_hand, to_xr
 from rotations import turned
 from scipy.spatial.transform import Rotation
 
@@ -14,7 +15,7 @@ from ig2mj.agents.humanoid.frames import BODY_Z, EYE_POS, HAND_POS, HAND_QUAT, M
 from ig2mj.vr.frames import SHAPES, Gaze, Hand, PlayArea, Pose, PoseFrame, from_arrays, to_arrays
 from ig2mj.vr.mapping import HumanoidPose, Memory, action_of, heading
 from ig2mj.vr.play_area import HEIGHTS, brought_to, moved
-from ig2mj.vr.xr_axes import grip_of_hand, hand_from_grip, head_from_xr, to_xr
+from ig2mj.vr.xr_axes import hand_from_grip, head_from_xr
 
 STILL = Rotation.identity()
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from apple_on_table import APPLE_ON_TABLE
 from chromium import HEAD, PLACE, STICK, chromium, wear_headset
+from inverses import grip_of_hand, to_xr
 from scipy.spatial.transform import Rotation
 
 from ig2mj.agents.humanoid.frames import HAND_QUAT
@@ -19,7 +20,6 @@ from ig2mj.vr.page_source import PagePoses
 from ig2mj.vr.recorded import RecordedPoses
 from ig2mj.vr.server import PAGE, THREE, HomePage
 from ig2mj.vr.session import Session, person_environment
-from ig2mj.vr.xr_axes import grip_of_hand, to_xr
 from ig2mj.web.access import access_for
 
 pytestmark = [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 import pytest
@@ -11,9 +13,17 @@ import ig2mj
 from ig2mj.agents import Humanoid
 from ig2mj.process.opengl import GL_BACKENDS, probe_gl
 from ig2mj.vr.frames import Pose
-from ig2mj.vr.stereo import StereoImages, eyes_of
+from ig2mj.vr.stereo import HEIGHT, WIDTH, Eye, StereoImages
 
 pytestmark = pytest.mark.skipif(all(probe_gl(b) for b in GL_BACKENDS), reason="no OpenGL draws on this machine")
+
+
+def eyes_of(head: Pose, apart: float = 0.063, across: float = math.radians(98)) -> tuple[Eye, Eye]:
+    """Two eyes `apart` m from each other, with an angle of view of `across` rad."""
+    half = across / 2
+    high = math.atan(math.tan(half) * HEIGHT / WIDTH)
+    left, right = (Pose.of(head.pos + head.turn.apply((0.0, y, 0.0)), head.turn) for y in (apart / 2, -apart / 2))
+    return Eye(left, -half, half, high, -high), Eye(right, -half, half, high, -high)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ig2mj.engine.view import Array
+from ig2mj.engine.view import Array, PhysicsView
 
 
 def scale_command(
@@ -49,6 +49,11 @@ def wheel_odometry(wheels: Float[Array, "W 2"], radius: float, axle: float) -> F
     """Speed forwards (m/s) and to the left (rad/s) of a base whose left and right wheel turn like this (rad/s)."""
     left, right = wheels[:, 0], wheels[:, 1]
     return jnp.stack([(left + right) / 2 * radius, (right - left) * (radius / axle)], axis=1)
+
+
+def compiled_eye(view: PhysicsView, agent: int) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
+    """Pose of an agent's camera that moves with its joints alone, as the view has it: world frame, m and w-x-y-z."""
+    return jnp.asarray(view.agent.eye_pos)[:, agent], jnp.asarray(view.agent.eye_quat)[:, agent]
 
 
 def discrete_drive(radius: float, axle: float, max_wheel: float) -> Float[np.ndarray, "5 2"]:

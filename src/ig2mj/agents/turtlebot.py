@@ -16,6 +16,7 @@ from jaxtyping import Float
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.controllers import (
+    compiled_eye,
     differential_drive,
     discrete_drive,
     drive_limits,
@@ -168,7 +169,7 @@ class TurtleBotController:
         return state
 
     def eye(self, view: PhysicsView, state: Float[Array, "W 0"]) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
-        return jnp.asarray(view.agent.eye_pos)[:, self.agent], jnp.asarray(view.agent.eye_quat)[:, self.agent]
+        return compiled_eye(view, self.agent)
 
     def proprioception(self, view: PhysicsView, state: Float[Array, "W 0"]) -> Float[Array, "W 2"]:
         """Speed forwards (m/s) and to the left (rad/s), computed from the wheels. (iGibson forgets the radius in the

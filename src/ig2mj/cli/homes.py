@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tyro
 
-if TYPE_CHECKING:
-    from ig2mj_homes.objects.entry import Entry
-
-    from ig2mj.callbacks import ProgressCallback
+from ig2mj.cli.common.homes import entries_of, shipped_homes
+from ig2mj.cli.homes_content import MAX_HULLS, build, convert
+from ig2mj.cli.homes_images import images, sheet, tour
 
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
-
-
-MAX_HULLS = 16
-"""Convex pieces per link, at most. With 16 the volume error of every link is below 6 %."""
 
 
 def make(
@@ -116,149 +111,6 @@ def model(
     print(f"{out}: {category}/{made}, {'fixed' if entry.fixed else 'loose'} (look: ig2mj view {out})")
 
 
-def build(
-    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DATASET")],
-    seed: int = 0,
-    only: tuple[str, ...] = (),
-    jobs: int | None = None,
-    home: tuple[str, ...] = (),
-    json: Flag = False,
-) -> None:
-    """Write a dataset root in iGibson's layout: VERSION, metadata, objects and scenes.
-
-    Args:
-      out: root of the dataset; categories and scenes already there are replaced.
-      seed: random seed of all variation; the same seed gives the same bytes.
-      only: build only these categories, and no homes unless --home names some.
-      home: build only these homes, and only the object categories they need.
-      jobs: number of processes; default: one per core.
-      json: print what was built as JSON.
-    """
-    from ig2mj_homes.dataset.root import build_dataset
-    from ig2mj_homes.dataset.shipped_homes import build_homes, categories_of, furnished
-
-    from ig2mj.cli.common.printing import add_bar, print_json, progress_bar
-
-    if home and not only:
-        only = tuple(sorted({c for name in home for c in categories_of(furnished(name, seed))}))
-    with progress_bar() as bar:
-        report = add_bar(bar, "building household objects")
-        built = build_dataset(
-            out,
-            seed=seed,
-            only=only or None,
-            jobs=jobs,
-            progress=report,
-        )
-        homes: dict[str, int] = {}
-        if home or not only:
-            homes = build_homes(out, home or None, seed, add_bar(bar, "furnishing homes"))
-    if json:
-        print_json({"dataset": str(out), "seed": seed, "categories": built, "homes": homes})
-        return
-    print(f"{out}: {sum(built.values())} models of {len(built)} categories, {len(homes)} homes")
-    if homes:
-        print(f"convert one: ig2mj convert scene --dataset {out} --scene {next(iter(homes))} --out OUT")
-
-
-def convert(
-    dataset: pathlib.Path,
-    out: pathlib.Path,
-    home: tuple[str, ...] = (),
-    jobs: int = 2,
-    no_cache: Flag = False,
-) -> int:
-    """Convert a dataset's homes and the object library into one folder with shared meshes, as scenes_mjcf/ has them.
-
-    Each home's checks are kept in OUT/HOME/checks.json, the library goes to OUT/objects/CATEGORY/MODEL. The exit
-    status is 1 if a check failed.
-
-    Args:
-      dataset: dataset root written by `ig2mj homes build`.
-      out: output folder; unused meshes there are removed.
-      home: convert only these homes, and no objects.
-      jobs: number of processes.
-      no_cache: convert again what has not changed, and write nothing to the cache.
-    """
-    from ig2mj_converters.base.options import ConvertOptions
-    from ig2mj_converters.conversion import convert_scene
-    from ig2mj_homes.dataset.ship import remove_unused, strip_report, total_bytes
-
-    from ig2mj.cli.common.printing import add_bar, progress_bar
-
-    names = _scenes_of(dataset, home)
-    failed: list[str] = []
-    cached = 0
-    with progress_bar() as bar:
-        whole = add_bar(bar, "homes")
-        for number, name in enumerate(names):
-            whole(number, len(names), name)
-            part = add_bar(bar, name)
-            options = ConvertOptions(jobs=jobs, assets="..", cache=not no_cache, progress=part, max_hulls=MAX_HULLS)
-            cached += convert_scene(dataset, name, out / name, options=options).cached
-            failed += strip_report(out / name)
-            bar.remove_task(bar.task_ids[-1])
-        added = 0 if home else _convert_objects(dataset, out, not no_cache, add_bar(bar, "objects"), failed)
-    remove_unused(out)
-    kept = f" ({cached} unchanged, taken from the cache)" if cached else ""
-    megabytes = total_bytes(out) / 1e6
-    print(f"{out}: {len(names)} homes, {added} objects, {megabytes:.1f} MB, {len(failed)} checks failed{kept}")
-    for line in failed:
-        print(f"  {line}")
-    return 1 if failed else 0
-
-
-def _convert_objects(
-    dataset: pathlib.Path,
-    out: pathlib.Path,
-    cache: bool,
-    progress: ProgressCallback,
-    failed: list[str],
-) -> int:
-    """Converts the object library; adds lines of failed checks to `failed`. How many models."""
-    import json
-
-    from ig2mj_converters.base.options import ConvertOptions
-    from ig2mj_converters.conversion import convert_object
-    from ig2mj_homes.dataset.object_library import (
-        ASSETS,
-        FOLDER,
-        PREFERRED_FILE,
-        VARIANTS_FILE,
-        is_fixed,
-        library_models,
-        preferred_models,
-        split_models,
-    )
-    from ig2mj_homes.dataset.ship import strip_report
-
-    models = library_models(dataset)
-    for number, (category, model, urdf) in enumerate(models):
-        progress(number, len(models), category)
-        folder = out / FOLDER / category / model
-        options = ConvertOptions(assets=ASSETS, cache=cache, max_hulls=MAX_HULLS)
-        convert_object(urdf, category, folder, model=model, fixed=is_fixed(category), options=options)
-        failed += strip_report(folder, keep_checks=False)
-    for file, content in ((PREFERRED_FILE, preferred_models(models)), (VARIANTS_FILE, split_models(models))):
-        if content:
-            text = json.dumps(content, indent=1, sort_keys=True) + "\n"
-            (out / FOLDER / file).write_text(text, encoding="utf-8", newline="\n")
-    return len(models)
-
-
-def _scenes_of(dataset: pathlib.Path, requested: tuple[str, ...]) -> list[str]:
-    """Scenes of a dataset, all or the requested ones. Raises InputError, UnknownNameError."""
-    from ig2mj.errors import InputError, UnknownNameError
-
-    found = sorted(folder.parent.name for folder in (dataset / "scenes").glob("*/urdf"))
-    if not found:
-        raise InputError(dataset, "holds no scenes/*/urdf", fix="give the folder that `ig2mj homes build` wrote")
-    for name in requested:
-        if name not in found:
-            raise UnknownNameError(f"home of {dataset}", name, found)
-    return list(requested) or found
-
-
 def list_(
     objects: Flag = False,
     only: tuple[str, ...] = (),
@@ -306,123 +158,8 @@ def _categories(only: tuple[str, ...]) -> list[dict[str, Any]]:
             "fixed": e.fixed,
             "models": e.count,
         }
-        for e in _entries(only)
+        for e in entries_of(only)
     ]
-
-
-def sheet(
-    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="PNG")],
-    only: tuple[str, ...] = (),
-    models: int = 1,
-    seed: int = 0,
-    opened: Flag = False,
-    collision: Flag = False,
-) -> None:
-    """Render a contact sheet of models; needs OpenGL (see `ig2mj doctor`).
-
-    Args:
-      out: output image.
-      only: only these categories; default: all.
-      models: number of models of each category.
-      seed: random seed of all variation.
-      opened: show doors, drawers and lids open.
-      collision: show the collision hulls instead of the visual meshes.
-    """
-    from ig2mj_homes.objects.catalogue import build_model
-    from ig2mj_homes.sheet import contact_sheet
-
-    from ig2mj.cli.common.files import check_image
-    from ig2mj.errors import Ig2mjError
-    from ig2mj.process.opengl import use_opengl
-
-    if models < 1:
-        raise Ig2mjError(f"--models {models}: at least one is needed")
-    entries = _entries(only)
-    check_image(out)
-    use_opengl()
-    chosen = [build_model(e, k, seed) for e in entries for k in range(min(models, e.count + e.extra))]
-    contact_sheet(chosen, opened=opened, collision=collision).save(out)
-    print(f"{out}: {len(chosen)} model{'s' * (len(chosen) != 1)}")
-
-
-def images(
-    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")],
-    home: tuple[str, ...] = (),
-    rooms: Flag = False,
-    looks: str = "day",
-) -> None:
-    """Render contact sheets of the homes: DIR/homes.jpg from above, and DIR/rooms_HOME.jpg of the rooms from inside.
-
-    Args:
-      out: output folder.
-      home: names or folders of homes; default: all that ship with ig2mj.
-      rooms: also render the rooms, one sheet per home.
-      looks: "day", "night", or "plain" (without decoration).
-    """
-    from ig2mj.scene.scene import load_scene
-    from ig2mj.viewer.home_sheet import from_above, rooms_inside
-
-    scenes = [load_scene(name, looks=looks) for name in home or [h["home"] for h in shipped_homes()]]
-    scenes.sort(key=lambda scene: scene.tables.num_objects)
-    out.mkdir(parents=True, exist_ok=True)
-    sheets = {"homes.jpg": from_above(scenes)}
-    if rooms:
-        sheets |= {f"rooms_{scene.name}.jpg": rooms_inside([scene]) for scene in scenes}
-    for name, sheet in sheets.items():
-        sheet.save(out / name, quality=82)
-        print(out / name)
-
-
-def tour(
-    home: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="HOME")],
-    video: Annotated[pathlib.Path, tyro.conf.arg(metavar="FILE")],
-    looks: str = "day",
-    size: Annotated[tuple[int, int], tyro.conf.arg(metavar="W H")] = (1280, 720),
-) -> None:
-    """Write a video of a walk through a home: from above, then room after room through open doors.
-
-    Args:
-      home: name or folder of a home.
-      video: output file: .mp4, .gif or .webp.
-      looks: "day", "night", or "plain" (without decoration).
-      size: width and height in pixels.
-    """
-    from ig2mj.cli.common.files import check_video
-    from ig2mj.cli.common.printing import add_bar, progress_bar
-    from ig2mj.errors import Ig2mjError
-    from ig2mj.process.opengl import use_opengl
-    from ig2mj.scene.scene import load_scene
-    from ig2mj.viewer.tour import film_tour
-
-    if min(size) < 2:
-        raise Ig2mjError(f"--size {size[0]} {size[1]}: at least 2 x 2 pixels")
-    check_video(video)
-    scene = load_scene(home, looks=looks)
-    use_opengl()
-    with progress_bar() as bar:
-        count = film_tour(scene, video, size=size, progress=add_bar(bar, f"tour of {scene.name}"))
-    print(f"{video}: {count} frames, {count / 30:.0f} s")
-
-
-def shipped_homes() -> list[dict[str, Any]]:
-    """Name, rooms and number of objects (see `ObjectEntry.in_household`) of every home in scenes_mjcf/."""
-    from ig2mj.scene import paths
-    from ig2mj.scene.manifest import load_manifest
-
-    homes = []
-    for name in paths.shipped_homes():
-        manifest = load_manifest(paths.SHIPPED_HOMES / name)
-        objects = [o for o in manifest.objects if o.in_household]
-        rooms = list(manifest.rooms.instances)
-        movable = sum(not o.fixed for o in objects)
-        homes.append({"home": name, "rooms": rooms, "objects": len(objects), "movable": movable})
-    return homes
-
-
-def _entries(only: tuple[str, ...]) -> list[Entry]:
-    from ig2mj_homes.objects.catalogue import catalogue, find
-
-    return [find(name) for name in only] if only else list(catalogue().values())
 
 
 SUBCOMMANDS: dict[str, Callable[..., int | None]] = {

@@ -135,11 +135,11 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
     from ig2mj.learn.checkpoints import Checkpoints
     from ig2mj.learn.demos import load_demos
     from ig2mj.learn.device_memory import is_out_of_memory, too_large
-    from ig2mj.learn.iteration import AXIS
     from ig2mj.learn.occlusion.encoder_pretraining import pretrain
     from ig2mj.learn.perception import Perception, depth_range_of
     from ig2mj.learn.policies import Policy, depends_on, objects_on_card, robot_folder, world_of
     from ig2mj.learn.run_config import initial_policy, settings_of
+    from ig2mj.learn.several_devices import AXIS
     from ig2mj.learn.train import Run, train
     from ig2mj.learn.warm_start import init_from_policy
     from ig2mj.process import keep_scratch_in_place

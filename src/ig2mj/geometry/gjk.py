@@ -29,7 +29,6 @@ from ig2mj.geometry.poses import (
     quat_rotate_inverse,
     relative_pose,
 )
-from ig2mj.scene.tables import PieceKind
 
 MAX_STEPS = 40
 """Polyhedra need about ten steps, cylinders up to thirty."""
@@ -123,19 +122,6 @@ def pair_distance(pairs: PosedPieces) -> Nearest:
         point_b=world[..., 1, :] + unit * (radii[..., 1] + excess * (1.0 - share))[..., None],
         overlap=distance <= 0.0,
     )
-
-
-def point_distance(point: Float[AnyArray, "*#b 3"], piece: PosedPieces) -> Nearest:
-    """Distance of points from pieces, 0 inside; `point_b` is the nearest point of the piece."""
-    shape = point.shape[:-1]
-    as_piece = PosedPieces(
-        kind=np.full(shape, PieceKind.SPHERE),
-        size=np.zeros((*shape, 3), np.float32),
-        vertices=np.zeros((*shape, 1, 3), np.float32),
-        pos=point,
-        quat=np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (*shape, 4)),
-    )
-    return piece_distance(as_piece, piece)
 
 
 def _core_witnesses(pairs: PosedPieces) -> tuple[Float[Array, "*b 2 3"], Bool[Array, "*b"]]:

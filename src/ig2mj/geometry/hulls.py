@@ -23,8 +23,8 @@ def signed_depth(
     """How deep a point lies in a piece, in the piece's frame: positive inside, negative outside.
 
     Inside it is the distance to the surface. Outside it is exact (the negative distance) for round pieces; for
-    polyhedra it is the negative distance from the farthest violated face's plane, which is nearer than the surface
-    where an edge or a corner is nearest (`ig2mj.geometry.gjk.point_distance` is exact there).
+    polyhedra it is the negative distance from the farthest violated face's plane, which underestimates the distance
+    where an edge or a corner is nearest (`ig2mj.geometry.gjk.piece_distance` is exact there).
     """
     xp = namespace(size, planes, point)
     radius, half = size[..., 0], size[..., 1]

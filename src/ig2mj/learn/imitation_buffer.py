@@ -7,6 +7,7 @@ image, m numbers that are remembered, g of a prediction.
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +16,7 @@ from jaxtyping import Float, Int, UInt8
 
 from ig2mj.engine.view import Array
 from ig2mj.learn.perception import Perception, Seen
+from ig2mj.learn.replay import write_ring
 
 ImagelessBatch = tuple[Float[Array, "B v"], Float[Array, "B n"], Float[Array, "B m"], Float[Array, "B g"]]
 """Steps without their images (`ImitationBuffer.sample_imageless`)."""
@@ -81,9 +83,7 @@ class ImitationBuffer:
         count, capacity = label.shape[0], self.label.shape[0]
         assert capacity % count == 0, "steps are written without a seam"
 
-        def put(ring: Array, new: Array) -> Array:
-            return jax.lax.dynamic_update_slice_in_dim(ring, new.astype(ring.dtype), self.head, 0)
-
+        put = functools.partial(write_ring, head=self.head)
         return dataclasses.replace(
             self,
             vector=put(self.vector, seen.vector),

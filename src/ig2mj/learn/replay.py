@@ -3,12 +3,13 @@
 A ring of T steps of W worlds. The observation after a step is kept next to the one before it: where an episode was
 cut off, the two neighbours in the ring are of different episodes, and the value of the last state is still needed.
 
-Axes: T steps, W worlds, B samples, n numbers of an action, v of a vector, q bytes of a image.
+Axes: T steps, W worlds, B samples, n numbers of an action, v of a vector, q bytes of an image.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +20,11 @@ from ig2mj.engine.view import Array
 from ig2mj.learn.collect import Transition
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.perception import Perception, Seen
+
+
+def write_ring(ring: Array, new: Array, *, head: Int[Array, ""]) -> Array:
+    """A ring buffer [T, ...] with new rows [t, ...] from row `head` on, which must not pass its end."""
+    return jax.lax.dynamic_update_slice_in_dim(ring, new.astype(ring.dtype), head, 0)
 
 
 @struct.dataclass
@@ -105,9 +111,7 @@ class Replay:
         length = rollout.reward.shape[0]
         assert self.capacity % length == 0, "a rollout is written without a seam"
 
-        def put(ring: Array, new: Array) -> Array:
-            return jax.lax.dynamic_update_slice_in_dim(ring, new.astype(ring.dtype), self.head, 0)
-
+        put = functools.partial(write_ring, head=self.head)
         return dataclasses.replace(
             self,
             vector=put(self.vector, rollout.seen.vector),

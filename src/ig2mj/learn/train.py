@@ -26,10 +26,11 @@ from ig2mj.cluster.team import Team
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.checkpoints import TAKEN, Checkpoints, newest, only_run, same, whole
 from ig2mj.learn.collect import TrainingEnv, horizon_of
-from ig2mj.learn.iteration import Algorithm, ManyDevices, OneDevice, SeveralHomes
+from ig2mj.learn.iteration import Algorithm, OneDevice, SeveralHomes
 from ig2mj.learn.log import Log
 from ig2mj.learn.progress import EPISODES, Window
 from ig2mj.learn.settings import old_names_work
+from ig2mj.learn.several_devices import ManyDevices
 from ig2mj.process import entry_point
 from ig2mj.tasks.custom.code import shown
 

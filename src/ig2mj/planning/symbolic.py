@@ -21,9 +21,10 @@ from ig2mj.planning.facts import Facts
 from ig2mj.planning.problem import start_of
 from ig2mj.planning.steps import Outcome, PlanningError, Step
 from ig2mj.predicates.logic import Atom
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.many import make_sampler
-from ig2mj.sampling.placement import Budget, Rejections
+from ig2mj.sampling.placement import Rejections
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.row import RowSampler
 from ig2mj.scene.scene import Scene

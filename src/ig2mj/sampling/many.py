@@ -24,8 +24,9 @@ from ig2mj.cluster.journal import Journal
 from ig2mj.errors import EngineError
 from ig2mj.predicates.logic import Expression
 from ig2mj.process import entry_point
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import Condition, bind, read_conditions
-from ig2mj.sampling.placement import Budget, Rejections
+from ig2mj.sampling.placement import Rejections
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.row import Row, RowSampler
 from ig2mj.sampling.scene_refs import check_of, lent, named, scene_named

@@ -11,8 +11,6 @@ from __future__ import annotations
 import collections
 import dataclasses
 import itertools
-import math
-import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 
 import numpy as np
@@ -20,10 +18,12 @@ from jaxtyping import Bool, Float
 
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.bystanders import Bystanders
 from ig2mj.sampling.columns import CELL, ColumnWindow
 from ig2mj.sampling.drop import Rest, origin, rest_at
 from ig2mj.sampling.footprint import Footprint
+from ig2mj.sampling.orientations import StableOrientations, tipped
 from ig2mj.sampling.possible import possible_origins
 from ig2mj.sampling.query import SceneQuery
 
@@ -48,9 +48,6 @@ AT_ONCE = 4
 FALLS_IN = 4
 """Of loosely supported candidates of which the predicate is false before anything is let go, one in so many is let go
 nevertheless: it may fall into the container."""
-
-TILT = 0.35
-"""Radians by which a tipped object leans at most."""
 
 LIFTS = 3
 """Times that an object that stands in something is lifted by as much as it stands in it."""
@@ -128,40 +125,6 @@ def holding_at_once(areas: Areas) -> Areas:
     return asked
 
 
-@dataclasses.dataclass
-class Budget:
-    """How much may still be tried. Work is counted, not timed, so that a seed gives the same state on any machine.
-
-    Attributes:
-      work: candidates that may be let go, and searches for candidates; each is one unit, some 5 to 20 ms, and those
-        that take long to settle are more.
-      seconds: time after which nothing is begun; infinite unless a person is waiting. clock: that measures
-        it; default: wall time.
-    """
-
-    work: int = 250
-    seconds: float = math.inf
-    clock: Callable[[], float] = time.monotonic
-
-    def __post_init__(self) -> None:
-        self._end = self.clock() + self.seconds
-
-    def spend(self) -> bool:
-        """Takes a unit; False where none is left."""
-        if self.spent():
-            return False
-        self.work -= 1
-        return True
-
-    def spent(self) -> bool:
-        """Whether it is used up."""
-        return self.work <= 0 or self.clock() >= self._end
-
-    def part(self, share: int) -> Budget:
-        """A budget of one part in `share` of what is left; what it spends is not taken from this one."""
-        return Budget(max(self.work // share, 1), self._end - self.clock(), self.clock)
-
-
 Rejections = collections.Counter
 
 
@@ -186,7 +149,7 @@ class Placer:
     def __init__(self, query: SceneQuery):
         """Binds a world."""
         self.query = query
-        self._orientations = [_orientations(entry.orientations) for entry in query.scene.manifest.objects]
+        self._orientations = StableOrientations(query)
 
     def place(
         self,
@@ -218,10 +181,10 @@ class Placer:
                 break
             support = SUPPORT[min(draw * len(SUPPORT) // FIRST_DRAWS, len(SUPPORT) - 1)]
             aligned = along if draw % 2 else -1
-            quat = self._orientation(object_index, rng, aligned, flat)
+            quat = self._orientations.draw(object_index, rng, aligned, flat)
             shift = rng.uniform(-CELL / 2, CELL / 2, 2)
             if container and support == "loose" and draw // 2 % 2:
-                quat = _tipped(quat, rng, np.asarray(self.query.view.object_quat[0, aligned]) if aligned >= 0 else None)
+                quat = tipped(quat, rng, np.asarray(self.query.view.object_quat[0, aligned]) if aligned >= 0 else None)
             shape = self.query.footprint(object_index, quat, shift)
             if draw == 0:
                 container = any(area.loose for area in itertools.islice(areas(shape, np.random.default_rng(0)), 1))
@@ -388,51 +351,6 @@ class Placer:
             pos = pos + level / np.linalg.norm(level) * (distance - TOUCHING / 2)
             self.query.place(object_index, pos, quat)
         return pos
-
-    def _orientation(
-        self, object_index: int, rng: np.random.Generator, along: int, flat: bool
-    ) -> Float[np.ndarray, "4"]:
-        """A stable orientation drawn by its probability, turned about the vertical: by any angle, or as `along` is."""
-        quats, prob = self._orientations[object_index]
-        if quats is None:
-            quat = np.array(self.query.view.object_quat[0, object_index], float)
-        elif flat:
-            shapes = [self.query.footprint(object_index, q, np.zeros(2)) for q in quats]
-            quat = quats[int(np.argmin([shape.high - shape.low for shape in shapes]))]
-        else:
-            quat = quats[rng.choice(len(prob), p=prob)]
-        angle = rng.uniform(-np.pi, np.pi)
-        if along >= 0:
-            w, x, y, z = np.asarray(self.query.view.object_quat[0, along], float)
-            angle = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) + rng.integers(4) * np.pi / 2
-        w, x, y, z = quat
-        c, s = np.cos(angle / 2), np.sin(angle / 2)
-        turned = np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
-        return turned / np.linalg.norm(turned)
-
-
-def _tipped(
-    quat: Float[np.ndarray, "4"], rng: np.random.Generator, along: Float[np.ndarray, "4"] | None
-) -> Float[np.ndarray, "4"]:
-    """An orientation turned onto another side and tilted a little: a book stands and leans in a bag, it does not lie.
-
-    `along`: orientation of the container, about one of whose horizontal axes the object is turned; None: about any.
-    """
-    angle = rng.uniform(-np.pi, np.pi)
-    if along is not None:
-        w, x, y, z = along
-        angle = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) + rng.integers(4) * np.pi / 2
-    turn = (np.pi / 2 + rng.uniform(-TILT, TILT)) / 2
-    w, (x, y) = np.cos(turn), np.sin(turn) * np.array([np.cos(angle), np.sin(angle)])
-    a, b, c, d = quat
-    return np.array([w * a - x * b - y * c, w * b + x * a + y * d, w * c + y * a - x * d, w * d + x * c - y * b])
-
-
-def _orientations(entries: Sequence) -> tuple[np.ndarray | None, np.ndarray]:
-    if not entries:
-        return None, np.zeros(0)
-    prob = np.array([e.prob for e in entries], float)
-    return np.array([e.quat for e in entries], float), prob / prob.sum()
 
 
 def _none() -> Rest:

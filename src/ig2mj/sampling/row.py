@@ -21,10 +21,11 @@ from ig2mj.errors import StateError
 from ig2mj.predicates.literals import object_index
 from ig2mj.sampling.areas import areas_for
 from ig2mj.sampling.attaching import attach, number_of
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.bystanders import Bystanders
 from ig2mj.sampling.conditions import Condition, order
 from ig2mj.sampling.joints import JointMover
-from ig2mj.sampling.placement import NOWHERE, RESTING_PENETRATION, Budget, Placer, Rejections
+from ig2mj.sampling.placement import NOWHERE, RESTING_PENETRATION, Placer, Rejections
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.setters import Change, set_by_name
 from ig2mj.sampling.truths import Truths

@@ -89,15 +89,11 @@ def _joint_columns(model: mujoco.MjModel, body_agent: np.ndarray) -> dict[str, A
     scalar = np.isin(model.jnt_type, [mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE])
     joints = np.flatnonzero(scalar & (agent >= 0))
     joints = joints[np.argsort(agent[joints], kind="stable")]
-    limited = np.asarray(model.jnt_limited)[joints] != 0
-    bounds = np.asarray(model.jnt_range)[joints]
     return {
         "agent_joint_names": tuple(model.joint(int(j)).name for j in joints),
         "agent_joint_agent": agent[joints],
         "agent_joint_qposadr": np.array(model.jnt_qposadr[joints], int),
         "agent_joint_dofadr": np.array(model.jnt_dofadr[joints], int),
-        "agent_joint_lower": np.where(limited, bounds[:, 0], -np.inf),
-        "agent_joint_upper": np.where(limited, bounds[:, 1], np.inf),
     }
 
 

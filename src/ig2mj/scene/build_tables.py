@@ -74,7 +74,6 @@ def build_tables(
         **_link_columns(model, objects, body_object, find, file),
         **_piece_columns(model, geom_object, file),
         **_room_columns(manifest, rooms, file),
-        **_orientation_columns(objects),
         **agent_columns(model, manifest.agents, find),
         **_graspable_columns(model, objects, find),
     )
@@ -239,13 +238,3 @@ def _graspable_columns(model: mujoco.MjModel, objects: list[ObjectEntry], find: 
             rows.append((int(model.jnt_bodyid[find("joint", joint, f"object '{entry.name}'")]), number, column))
     table = np.array(rows, int).reshape(-1, 3)
     return {"graspable_body": table[:, 0], "graspable_object": table[:, 1], "graspable_joint": table[:, 2]}
-
-
-def _orientation_columns(objects: list[ObjectEntry]) -> dict[str, Any]:
-    rows = [(number, o) for number, entry in enumerate(objects) for o in entry.orientations]
-    return {
-        "orientation_object": np.array([number for number, _ in rows], int),
-        "orientation_quat": np.array([o.quat for _, o in rows], np.float64).reshape(-1, 4),
-        "orientation_prob": np.array([o.prob for _, o in rows], np.float64),
-        "orientation_size": np.array([o.size for _, o in rows], np.float64).reshape(-1, 3),
-    }

@@ -2,7 +2,7 @@
 
 Axes: O objects, B bodies, G geoms, J openable joints, L annotated links, K convex collision pieces (one per collision
 geom), V vertices and N half-spaces of the largest piece (padded), A agents, H hands, F finger links, Q scalar joints of
-agents, Y graspable bodies, I stable orientations, nu actuators.
+agents, Y graspable bodies, nu actuators.
 """
 
 from __future__ import annotations
@@ -56,13 +56,11 @@ class SceneTables:
       room_names: room instances; room_types: type of each. room_map: index + 1 of the room instance per pixel, 0 none;
         row is y, column is x (iGibson's dataset format). room_resolution: metres a pixel.
       object_rooms: annotated rooms of fixed objects, [O, R].
-      orientation_*: stable orientations, sorted by object: object, quaternion of its base, probability, size (m) of
-        the axis-aligned box that the object fills when it stands so.
       agent_*: base body, camera id (-1 none), vertical field of view (radians).
       body_agent, body_hand: agent and hand that each body is part of, -1 none. A hand is its palm, everything that
         hangs on the palm, and its fingers.
       agent_joint_*: hinges and slides of the agents' bodies, by agent and then in the model's order: name, agent,
-        addresses in qpos and qvel, range (rad or m; infinite where the joint has no limit).
+        addresses in qpos and qvel.
       actuator_agent: agent that each actuator moves, -1 none.
       hand_*: palm or end effector body, agent. finger_*: finger link, its agent, its hand (-1: none is known).
       graspable_*: bodies that a hand can take hold of: the main body of every movable object that allows assisted
@@ -118,8 +116,6 @@ class SceneTables:
     agent_joint_agent: Int[np.ndarray, "Q"]
     agent_joint_qposadr: Int[np.ndarray, "Q"]
     agent_joint_dofadr: Int[np.ndarray, "Q"]
-    agent_joint_lower: Float[np.ndarray, "Q"]
-    agent_joint_upper: Float[np.ndarray, "Q"]
     actuator_agent: Int[np.ndarray, "nu"]
     hand_body: Int[np.ndarray, "H"]
     hand_agent: Int[np.ndarray, "H"]
@@ -129,10 +125,6 @@ class SceneTables:
     graspable_body: Int[np.ndarray, "Y"]
     graspable_object: Int[np.ndarray, "Y"]
     graspable_joint: Int[np.ndarray, "Y"]
-    orientation_object: Int[np.ndarray, "I"]
-    orientation_quat: Float[np.ndarray, "I 4"]
-    orientation_prob: Float[np.ndarray, "I"]
-    orientation_size: Float[np.ndarray, "I 3"]
 
     @property
     def num_objects(self) -> int:

@@ -70,12 +70,6 @@ class TemperatureLog:
         """When it first became so, or None."""
         return next((m for m in self.moments if (m.predicate, m.object, m.value) == (predicate, name, value)), None)
 
-    def first_step_at(self, name: str, celsius: float) -> int | None:
-        """The first control step after which the object is on the other side of a temperature than at the start."""
-        values = self.temperatures[name]
-        rising = values[0] < celsius
-        return next((k for k, v in enumerate(values) if (v >= celsius if rising else v <= celsius)), None)
-
     def write_csv(self, file: pathlib.Path) -> None:
         """One line per control step: step, time_s, `<object>_celsius`..., `<predicate>_<object>` (0 or 1)..."""
         with file.open("w", newline="", encoding="utf-8") as out:

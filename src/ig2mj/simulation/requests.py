@@ -24,7 +24,8 @@ from ig2mj.envs.planning_stage import DOORS_SETTLE
 from ig2mj.errors import AbilityError, StateError
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
-from ig2mj.planning.kinematic import SETTLE, KinematicRung, KinematicStage
+from ig2mj.planning.kinematic import SETTLE, KinematicRung
+from ig2mj.planning.kinematic_stage import KinematicStage
 from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.requests import KIT, MEASURED, Request, RequestSource
@@ -33,9 +34,9 @@ from ig2mj.planning.starts import open_doors, start_place
 from ig2mj.planning.steps import Outcome, PlanningError, Step
 from ig2mj.planning.symbolic import SymbolicRung
 from ig2mj.process import entry_point
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.many import make_sampler
-from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.row import Row
 from ig2mj.scene.paths import shipped_homes

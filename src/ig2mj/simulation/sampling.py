@@ -10,9 +10,9 @@ import numpy as np
 
 from ig2mj.engine.base import Snapshot, Write
 from ig2mj.errors import StateError
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.joints import JointMover
-from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.row import OPENINGS, Row, RowSampler
 from ig2mj.sampling.setters import Change, set_by_name

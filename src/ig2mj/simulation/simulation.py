@@ -37,8 +37,8 @@ from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.registry import find, find_state
 from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.process.deprecation import warn_renamed
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import Condition
-from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Objects, Scene, scene_with
 from ig2mj.simulation import images

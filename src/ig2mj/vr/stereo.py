@@ -54,18 +54,6 @@ class Eye:
     down: float
 
 
-def eyes_of(head: Pose, apart: float = 0.063, across: float = math.radians(98)) -> tuple[Eye, Eye]:
-    """Two eyes of a head in the world whose devices do not say where its eyes are.
-
-    Args:
-      apart: m between the eyes. across: rad, angle of view to both sides.
-    """
-    half = across / 2
-    high = math.atan(math.tan(half) * HEIGHT / WIDTH)
-    left, right = (Pose.of(head.pos + head.turn.apply((0.0, y, 0.0)), head.turn) for y in (apart / 2, -apart / 2))
-    return Eye(left, -half, half, high, -high), Eye(right, -half, half, high, -high)
-
-
 class StereoImages:
     """See the module's text. Attributes: width, height: pixels of one eye. context: MuJoCo's OpenGL context."""
 

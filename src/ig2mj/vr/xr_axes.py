@@ -39,14 +39,3 @@ def hand_from_grip(hand: int, pos: Vector, xyzw: Vector) -> Pose:
     """The humanoid's hand (0 left, 1 right) whose palm lies in the grip."""
     turn = FROM_XR * Rotation.from_quat(xyzw) * HAND_IN_GRIP[hand]
     return Pose.of(vector_from_xr(pos) - turn.apply(mirrored(hand, PALM_CENTER)), turn)
-
-
-def to_xr(pose: Pose) -> tuple[np.ndarray, np.ndarray]:
-    """Position and x-y-z-w of a head in XR's axes: the inverse of `head_from_xr`."""
-    return FROM_XR.inv().apply(pose.pos), (FROM_XR.inv() * pose.turn * FROM_XR).as_quat()
-
-
-def grip_of_hand(hand: int, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
-    """Position and x-y-z-w of the grip that a hand lies in: the inverse of `hand_from_grip`."""
-    palm = pose.pos + pose.turn.apply(mirrored(hand, PALM_CENTER))
-    return FROM_XR.inv().apply(palm), (FROM_XR.inv() * pose.turn * HAND_IN_GRIP[hand].inv()).as_quat()

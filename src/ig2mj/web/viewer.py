@@ -59,7 +59,6 @@ class WebViewer:
         self._tint: Int[np.ndarray, "O"] | None = None
         self._effects = False
         self._moved = 0
-        self._rows_shown: tuple[int, int] = (0, 0)
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="ig2mj-shows", daemon=True)
         self._server.on_client_disconnect(self._left)

@@ -42,7 +42,7 @@ def placed(tree, spec, mesh):
 LEARNER = """
 import dataclasses
 from ig2mj.learn.collect import Seen, Transition
-from ig2mj.learn.iteration import AXIS, ManyDevices
+from ig2mj.learn.several_devices import AXIS, ManyDevices
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.sac import SAC, SACConfig
 from ig2mj.learn.nonempty_leaves import nonempty, nonempty_specs

@@ -24,6 +24,7 @@ from jaxtyping import Bool, Float
 
 from ig2mj.agents.base import HandReading
 from ig2mj.agents.controllers import (
+    compiled_eye,
     differential_drive,
     drive_limits,
     scale_command,
@@ -188,7 +189,7 @@ class FetchController:
         return length(pulled - forward(CHAIN, q)[0])[:, None]
 
     def eye(self, view: PhysicsView, state: FetchState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
-        return jnp.asarray(view.agent.eye_pos)[:, self.agent], jnp.asarray(view.agent.eye_quat)[:, self.agent]
+        return compiled_eye(view, self.agent)
 
     def proprioception(self, view: PhysicsView, state: FetchState) -> Float[Array, "W m"]:
         """See `ig2mj.agents.fetch.proprioception`."""

@@ -26,7 +26,7 @@ from flax import struct
 from jaxtyping import Bool, Float
 
 from ig2mj.agents.base import HandReading
-from ig2mj.agents.controllers import differential_drive, drive_limits, wheel_odometry
+from ig2mj.agents.controllers import compiled_eye, differential_drive, drive_limits, wheel_odometry
 from ig2mj.agents.kinematics import Chain, forward
 from ig2mj.agents.urdf.base_motion import drive, glide, wheel_signs
 from ig2mj.agents.urdf.body import RobotBody
@@ -215,7 +215,7 @@ class UrdfController:
         return jnp.concatenate(behind, axis=1)
 
     def eye(self, view: PhysicsView, state: UrdfState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
-        return jnp.asarray(view.agent.eye_pos)[:, self.agent], jnp.asarray(view.agent.eye_quat)[:, self.agent]
+        return compiled_eye(view, self.agent)
 
     def proprioception(self, view: PhysicsView, state: UrdfState) -> Float[Array, "W m"]:
         """Speeds of the base computed from the wheels (m/s, rad/s), of an omnidirectional one those of the base itself

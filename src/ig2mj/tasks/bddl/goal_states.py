@@ -28,9 +28,10 @@ from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.readings import Reading, readings
 from ig2mj.predicates.registry import OF_SUBSTANCES
 from ig2mj.process import entry_point
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import MUTUAL, Condition
 from ig2mj.sampling.many import Sampled, make_sampler, packed_row, sample_row, sampled_rows
-from ig2mj.sampling.placement import Budget, Rejections
+from ig2mj.sampling.placement import Rejections
 from ig2mj.sampling.row import Row, RowSampler
 from ig2mj.sampling.scene_refs import check_of, named, scene_named
 from ig2mj.scene.manifest import load_manifest

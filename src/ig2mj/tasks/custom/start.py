@@ -20,9 +20,10 @@ import jax
 import numpy as np
 
 from ig2mj.errors import InputError, PoseError
+from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import bind, read_conditions
 from ig2mj.sampling.many import ATTEMPTS, ROW_BUDGET, make_sampler
-from ig2mj.sampling.placement import RESTING_PENETRATION, Budget
+from ig2mj.sampling.placement import RESTING_PENETRATION
 from ig2mj.sampling.row import Row, RowSampler
 from ig2mj.scene.scene import Scene
 from ig2mj.tasks.custom.code import TaskCode, call, label_of, place_of
