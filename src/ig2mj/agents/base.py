@@ -129,7 +129,7 @@ class Robot(Protocol):
         ...
 
     def hand_rays(self) -> tuple[HandRays, ...]:
-        """Where its hands look for what is in them, for assistive grasping; in the order of its entry's hands."""
+        """Rays of each hand for assistive grasping, in the order of the hands in the manifest's entry."""
         ...
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> Controller:

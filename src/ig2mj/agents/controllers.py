@@ -1,4 +1,4 @@
-"""Pieces that controllers of robots are made of: pure functions over a batch, with figures known while tracing.
+"""Building blocks of robots' controllers: pure, batched functions. Geometry and limits are constants while tracing.
 
 Axes: W worlds, n numbers, J joints.
 """
@@ -32,7 +32,7 @@ def differential_drive(
 
     Args:
       command: m/s forwards, rad/s to the left.
-      radius, axle: of the wheels, and between them, m.
+      radius: of the wheels, m. axle: distance between the wheels, m. max_wheel: limit of a wheel, rad/s.
     """
     forward, turn = command[:, 0], command[:, 1] * (axle / 2)
     wheels = jnp.stack([forward - turn, forward + turn], axis=1) / radius
@@ -46,7 +46,7 @@ def drive_limits(radius: float, axle: float, max_wheel: float) -> Float[np.ndarr
 
 
 def wheel_odometry(wheels: Float[Array, "W 2"], radius: float, axle: float) -> Float[Array, "W 2"]:
-    """Speed forwards (m/s) and to the left (rad/s) of a base whose left and right wheel turn like this (rad/s)."""
+    """Speed forwards (m/s) and to the left (rad/s) of a base, from the speeds of its left and right wheel (rad/s)."""
     left, right = wheels[:, 0], wheels[:, 1]
     return jnp.stack([(left + right) / 2 * radius, (right - left) * (radius / axle)], axis=1)
 

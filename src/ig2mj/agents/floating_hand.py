@@ -76,7 +76,7 @@ class FloatingHand:
 
 
 class HandController:
-    """An action is the controls themselves: where palm and fingers are to go, see `hand_ctrl`. It feels nothing."""
+    """An action is the controls: where palm and fingers are to go, see `hand_ctrl`. It has no proprioception."""
 
     moves_eye = False
     action_names: tuple[str, ...] = (

@@ -1,4 +1,4 @@
-"""Where a hand looks for what is in it: the points between which rays run, and the point objects should be near."""
+"""Rays with which a hand detects what is between its fingers, and the point that objects should be near."""
 
 from __future__ import annotations
 

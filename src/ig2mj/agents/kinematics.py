@@ -85,7 +85,8 @@ class Chain:
 def forward(
     chain: Chain, q: Float[Array, "W J"]
 ) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"], Float[Array, "W 6 J"]]:
-    """Position and orientation of the tip, and its Jacobian: rows 0-2 velocity, 3-5 angular velocity."""
+    """Position (m) and orientation (w-x-y-z) of the tip in the base's frame, and its Jacobian: rows 0-2 velocity,
+    3-5 angular velocity."""
     q = jnp.asarray(q)
     pos = jnp.zeros((*q.shape[:-1], 3), q.dtype)
     quat = jnp.broadcast_to(jnp.array([1.0, 0.0, 0.0, 0.0], q.dtype), (*q.shape[:-1], 4))

@@ -159,7 +159,7 @@ def add_pulled_joints(
 
 
 def extend_keyframes(spec: mujoco.MjSpec, qpos: Vector, dofs: int, controls: Vector) -> None:
-    """Keyframes of a scene know nothing of what was attached: its joints and actuators come last in them.
+    """Extends a scene's keyframes by the joints and actuators of an attached robot, which come last.
 
     A scene without keyframes gets one, of its zero pose: else all servos would pull to 0 until the first action. To be
     called when the robot's actuators have been added.

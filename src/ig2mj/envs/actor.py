@@ -1,7 +1,7 @@
 """`Actor`: an agent that is a pure function, such as a policy; and `Tally`, how episodes that run side by side end.
 
 On a pure engine an actor becomes part of the program that steps the worlds: many steps are one call, after which little
-is fetched. A step that is called from Python lets a GPU wait for Python.
+is fetched. Steps that are called one by one leave a GPU idle while Python runs.
 
 Axes: W worlds, n numbers of an action, m numbers that are remembered.
 """
@@ -108,7 +108,7 @@ class Actor:
         return np.asarray(action)
 
     def several(self, state: EnvState, tally: Tally, most: int = STEPS) -> tuple[EnvState, Tally]:
-        """Steps of a pure engine until all episodes are over, `most` and no more than `STEPS`. Uses up the state.
+        """Steps of a pure engine until all episodes are over, `most` and no more than `STEPS`. Consumes the state.
 
         Raises:
           ActionError: numbers of an action were not finite.
@@ -153,7 +153,7 @@ def begins(state: EnvState) -> Bool[Array, "W"]:
 
 
 def resting(action: Array, going: Bool[Array, "W"]) -> Array:
-    """Zeros where the episode is over. A world waits there for the others, and a policy that was trained up to the end
-    of episodes only would go on: a knife is pressed through the table with all force, until nothing is finite."""
+    """The action, zero where the episode is over. Such worlds wait for the others. In training a policy sees no states
+    after the end of an episode, and its actions could make physics non-finite there."""
     where = np.where if isinstance(action, np.ndarray) else jnp.where
     return where(going[:, None], action, np.float32(0.0))

@@ -1,4 +1,4 @@
-"""What is asked of states and actions, on the host."""
+"""Checks of states and actions, on the host."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def checked_state(state: EnvState) -> EnvState:
-    """The state. Raises ActionError: it is something else."""
+    """The state itself. Raises ActionError: it is no `EnvState`."""
     if not isinstance(state, EnvState):
         given = type(state).__name__
         raise ActionError(f"an environment takes the state that reset or the last step returned, not {given}")

@@ -196,9 +196,9 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
     def step_autoreset(self, state: EnvState, action: Array) -> EnvState:
         """`step`, and a new episode at once where one is over (Gymnasium's SAME_STEP).
 
-        Observations of worlds that are done are those of their new episodes; what was seen last is `info["final_obs"]`,
-        by name. Reward, `terminated`, `truncated` and the rest of `info` are of the episode that ended. Do not change
-        between this and `step` in a compiled loop: here `info` has one key more.
+        Observations of worlds that are done are those of their new episodes. The last observations of the episodes that
+        ended are `info["final_obs"]`, by name. Reward, `terminated`, `truncated` and the rest of `info` are of the
+        episode that ended. A compiled loop calls either this or `step`, because `info` has one more key here.
         """
         return self._sound(self._autoreset(checked_state(state), checked_action(self, action)))
 
@@ -298,10 +298,10 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         mask: Bool[Array, "W"] | None = None,
         before: EnvState | None = None,
     ) -> EnvState:
-        """The state of worlds that someone else has put where they are, in episodes of these rows of the pool.
+        """The environment's state for worlds that were changed outside of it, in episodes of these rows of the pool.
 
         Args:
-          mask, before: only these worlds were put somewhere; the others go on from that state. None: all were.
+          mask, before: only the masked worlds are taken from `batch`, the others from `before`. None: all are.
         """
         mask = np.ones(self.num_worlds, bool) if mask is None else np.asarray(mask)
         return self._resume(batch, mask, before, np.asarray(rows, np.int32))
@@ -428,4 +428,4 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         return {**self.core.metrics(state.batch), "bad_actions": int(np.asarray(state.bad_actions).sum())}
 
     def close(self) -> None:
-        """Nothing is left open; may be called twice."""
+        """Does nothing, since an environment holds no open resources. May be called twice."""

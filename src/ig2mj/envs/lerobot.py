@@ -143,7 +143,7 @@ def _with_success(info: dict[str, Any]) -> dict[str, Any]:
 
 
 def make_env(n_envs: int = 1, use_async_envs: bool = False, **options: Any) -> LeRobotVectorEnv:
-    """What LeRobot's EnvHub calls. `use_async_envs`: nothing to do, worlds step together in any case. `options`: of
+    """What LeRobot's EnvHub calls. `use_async_envs`: ignored, since worlds step together in any case. `options`: of
     `LeRobotVectorEnv`; default: CookingMeat from the cameras of the head and of both hands."""
     del use_async_envs
     options.setdefault("task", "CookingMeat")

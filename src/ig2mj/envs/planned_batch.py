@@ -41,7 +41,7 @@ REFILL = 16
 
 @dataclasses.dataclass(frozen=True)
 class PlannedEpisode:
-    """What became of an episode.
+    """Result of an episode.
 
     Attributes:
       number: of the episode. success: its goal held at the end. q: partial credit, 1 for a success; None: the planner
@@ -57,7 +57,7 @@ class PlannedEpisode:
 
 @dataclasses.dataclass
 class Spent:
-    """Where the wall time of a run went.
+    """Wall time of a run, by what it was spent on.
 
     Attributes:
       stepping: s in the environment's step, until its results are there. following: s in which programs are followed

@@ -1,4 +1,4 @@
-"""`EnvironmentStage`: worlds of an environment as the physics rung sees them; what it does are the task's own actions.
+"""`EnvironmentStage`: lets the physics rung act in an environment's worlds, through the task's own actions.
 
 Axes: W worlds, n numbers of the task's action, m of the robot's.
 """
@@ -110,11 +110,11 @@ class EnvironmentStage:
         self._state = state
 
     def observe(self, state: EnvState) -> None:
-        """Goes on from a state of the environment that somebody else has made."""
+        """Continues from a state of the environment that was made outside of the stage."""
         self._state = state
 
     def write(self, write: Write) -> None:
-        """Changes physics of the worlds between two steps, as somebody else may; `write` has a row for each world."""
+        """Changes the physics of the worlds between two steps. `write` has a row for each world."""
         self._state = dataclasses.replace(self.state, batch=self.env.core.write(self.state.batch, write))
 
     def act(self, action: Float[np.ndarray, "W m"]) -> None:

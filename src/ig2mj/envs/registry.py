@@ -171,9 +171,9 @@ def make(
       config: all settings, or a mapping of those that differ from the task's (`default_config`). A name in this place
         is that of the robot: `make("CookingMeat", "fetch", 16, "native", "mitten")` is short for `robot`, `worlds`,
         `engine` and `grasping`.
-      worlds: see `EnvConfig`. engine: likewise. grasping: likewise.
+      worlds, engine, grasping: see `EnvConfig`.
       config_overrides: settings by name, in place of those of `config`.
-      overrides: likewise, as keyword arguments: fields of `EnvConfig`, options of engines (`EngineOptions`), `homes`.
+      overrides: the same as keyword arguments: fields of `EnvConfig`, options of engines (`EngineOptions`), `homes`.
       action_space: "continuous", or "primitives": a `ig2mj.envs.primitives.PrimitiveEnv`, a Gymnasium environment whose
         arguments the overrides then are.
 

@@ -34,7 +34,7 @@ Watch = Callable[[EnvState], None]
 
 @dataclasses.dataclass(frozen=True)
 class Played:
-    """Of every episode, in the order in which they ended (or of the pool's rows, where those were played in order).
+    """Results of episodes, in the order in which they ended, or of the pool's rows where those were played in order.
 
     Attributes:
       success: how it ended. outcomes: the same of what the task measures, by name
@@ -189,15 +189,14 @@ def _qualities(env: Environment, begun: np.ndarray, ended: np.ndarray, success: 
 
 
 class Pace:
-    """How fast agent steps are taken, without the first, which compiles for seconds, and without what who watches does
-    (images take longer than steps)."""
+    """Agent steps per second, without the first step, which compiles, and without the time of the `watch` function."""
 
     def __init__(self, watch: Watch | None = None) -> None:
         self._steps, self._began, self._watch = 0, math.nan, watch
         self._watched = 0.0
 
     def look(self, state: EnvState) -> None:
-        """Shows a state to who watches; the time that takes does not count."""
+        """Passes a state to the `watch` function, whose time does not count."""
         if self._watch is None:
             return
         began = time.monotonic()

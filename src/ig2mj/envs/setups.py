@@ -131,7 +131,7 @@ def setup_activity(
     tried: Callable[[EnvSetup], object] = lambda setup: None,
     chosen: ModelChoices | None = None,
 ) -> EnvSetup:
-    """Of an activity.
+    """The setup of an activity.
 
     Args:
       count: rows of the pool. tried: called with a setup whose robot stands anywhere, before start states are sampled
@@ -223,7 +223,7 @@ def _placed_activity(
 def setup_navigation(
     task: NavigationTask, robot: str | TaskRobot, split: str, count: int | None, control: Control
 ) -> EnvSetup:
-    """Of a navigation task. Arguments as of `ig2mj.make`; `count`: start states."""
+    """The setup of a navigation task. Arguments as of `ig2mj.make`; `count`: start states."""
     name, first = find_robot(robot)
     control = control.of(first)
     check_able(task, name, first)
@@ -262,7 +262,7 @@ def setup_navigation(
 def setup_bddl(
     task: BddlTask, robot: str | TaskRobot, pool: Pool | None, split: str, count: int | None, control: Control
 ) -> EnvSetup:
-    """Of an activity that BDDL defines. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
+    """The setup of an activity that BDDL defines. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
     name, body = find_robot(robot)
     if isinstance(robot, str):
         check_able(task, name, body)

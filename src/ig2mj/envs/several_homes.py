@@ -72,7 +72,8 @@ _OWN += ("proprioception_names",)
 
 @entry_point
 class HomesEnvironment:
-    """See the module's text. What is not here is that of the first home (`task`, `robot`, `action_space`, ...).
+    """See the module's text. Other attributes are those of the first home's environment
+    (`task`, `robot`, `action_space`, ...).
 
     Attributes:
       envs: of the homes. homes: their names. num_worlds: W. privileged_names: of ground truth.

@@ -13,8 +13,9 @@
 | `perception`, `privileged_targets` | what networks see of observations, and what they predict |
 | `running_stats`, `adam` | means and scales; the optimizer |
 | `replay`, `imitation_buffer`, `imitation` | buffers on the device; an actor that learns labels |
-| `guidance` | an expert that begins episodes and labels states, less and less |
-| `collect`, `iteration`, `train` | steps under a policy; a rollout and what is learned from it; the loop |
+| `guidance` | an expert that begins episodes and labels states, with a share that is annealed to zero |
+| `collect`, `train` | steps under a policy; the loop |
+| `iteration`, `several_devices` | a rollout and the updates on it, on one device and on several |
 | `checkpoints`, `log`, `progress`, `best` | what survives a kill; reports; which policy is kept |
 | `settings`, `run_config` | settings by name; a run as a TOML file |
 | `policies`, `policy_checks`, `shipped`, `evaluate`, `warm_start` | policy files, those that ship, how good they are |

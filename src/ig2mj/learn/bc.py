@@ -68,7 +68,7 @@ class BCConfig:
 
 @struct.dataclass
 class BCLearner:
-    """All that is learned."""
+    """What a run learns: weights, the optimizer's state and running statistics."""
 
     actor: Any
     opt: Any

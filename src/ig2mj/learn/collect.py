@@ -29,7 +29,7 @@ FINAL = "final_obs"
 
 @runtime_checkable
 class TrainingEnv(Protocol):
-    """What is asked of an environment. `ig2mj.envs.Environment` has all of it, and a test's point mass does, too.
+    """What an environment must have for training; `ig2mj.envs.Environment` has all of it.
 
     A state has obs, reward, terminated, truncated and info, and is a dataclass. With `pure`, `step_autoreset_fn` can be
     part of a compiled program. `info["final_obs"]` is there after every `step_autoreset`.
@@ -81,7 +81,7 @@ class Transition:
 
 @struct.dataclass
 class Play:
-    """Where all worlds stand.
+    """State of all worlds between two steps.
 
     Attributes:
       state: of the environment. acting: what the algorithm carries from step to step (`Algorithm.acting_state`).
@@ -120,7 +120,7 @@ def begin(env: TrainingEnv, acting: Any, seed: int) -> Play:
 
 
 def started(state: Any, acting: Any, num_worlds: int) -> Play:
-    """Where all worlds stand that are in this state, at the start of an episode. `state`: or its shapes."""
+    """The `Play` of worlds in this state, at the start of an episode. `state`: the state, or its shapes."""
     zero = np.zeros(num_worlds)
     return Play(_kept(state), acting, jnp.asarray(zero, jnp.float32), jnp.asarray(zero, jnp.int32))
 

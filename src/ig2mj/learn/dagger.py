@@ -87,7 +87,7 @@ class DaggerConfig:
 
 @struct.dataclass
 class DaggerLearner:
-    """All that is learned.
+    """What a run learns: weights, the optimizer's state and running statistics.
 
     Attributes:
       actor: weights of what acts. last: weights of the last update, where those of `actor` are a mean; else None.

@@ -1,4 +1,4 @@
-"""An expert's part in reinforcement learning: it begins episodes and labels states, less and less.
+"""An expert's part in reinforcement learning: it begins episodes and labels states, with a share annealed to zero.
 
 In every episode it acts for a number of steps that is sampled from 0 to a limit, then the policy takes over. The limit
 falls to 0 over the first part of a run, so that the policy's starts move back from near the goal to the start of the

@@ -109,7 +109,7 @@ class OneDevice:
             self.play = lambda learner, play, key: native(learner, play, key, algorithm.length)
 
     def buffer(self) -> Any:
-        """What belongs to the worlds, at first."""
+        """The algorithm's buffer at the start of a run."""
         return self._algorithm.buffer(self.num_worlds)
 
     def begin(self, seed: int) -> Any:
@@ -127,13 +127,20 @@ class OneDevice:
             compile_together([whole, *programs])
 
     def place(self, learner: Any, buffer: Any) -> tuple[Any, Any]:
-        """Where an iteration wants them."""
+        """Learner and buffer as arrays on the device."""
         return jax.tree.map(jnp.asarray, (learner, buffer))
 
     def __call__(
         self, learner: Any, buffer: Any, play: Play, key: Array, progress: float, ready: bool, clock: float = 0.0
     ) -> tuple[Any, Any, Play, dict[str, float], dict[str, float], float | None]:
-        """Where all stands after an iteration, sums over its steps, losses, and seconds of the simulator if known."""
+        """One iteration.
+
+        Args:
+          progress: share of the run that is over, 0 to 1. ready: networks are updated. clock: seconds of the run.
+
+        Returns:
+          Learner, buffer and worlds; sums over the steps; losses; seconds of the simulator, None: not measured.
+        """
         share, go = jnp.float32(progress), jnp.bool_(ready)
         if self._whole is not None:
             learner, buffer, play, sums, losses = self._whole(learner, buffer, play, key, share, go)
@@ -147,8 +154,8 @@ class OneDevice:
 
 
 class SeveralHomes:
-    """The same over several homes on one device: each home's worlds play in a program of their own, with an expert of
-    their own, and one program learns from all of it."""
+    """An iteration over several homes on one device: a program of its own steps the worlds of each home, with an expert
+    of its own, and one program learns from all rollouts."""
 
     def __init__(self, env: Any, algorithm: Algorithm):
         """`env`: an `ig2mj.envs.several_homes.HomesEnvironment`."""
@@ -176,7 +183,7 @@ class SeveralHomes:
         return jax.jit(collect, donate_argnums=1)
 
     def buffer(self) -> Any:
-        """What belongs to the worlds, at first."""
+        """The algorithm's buffer at the start of a run."""
         return self._algorithm.buffer(self.num_worlds)
 
     def begin(self, seed: int) -> list[Play]:
@@ -186,7 +193,7 @@ class SeveralHomes:
         return [begin(part, state(part.num_worlds), self._env.seed_of(k, seed)) for k, part in parts]
 
     def place(self, learner: Any, buffer: Any) -> tuple[Any, Any]:
-        """Where an iteration wants them."""
+        """Learner and buffer as arrays on the device."""
         return jax.tree.map(jnp.asarray, (learner, buffer))
 
     def __call__(
@@ -215,11 +222,11 @@ class SeveralHomes:
 
 
 def finite(tree: Any) -> Array:
-    """No number of a tree is lost."""
+    """Whether all floating-point numbers of a tree are finite."""
     floats = [a for a in jax.tree.leaves(tree) if jnp.issubdtype(a.dtype, jnp.floating)]
     return jnp.stack([jnp.isfinite(a).all() for a in floats]).all()
 
 
 def floats(tree: Mapping[str, Any]) -> dict[str, float]:
-    """Numbers of the host."""
+    """Scalars as Python floats."""
     return {name: float(np.asarray(value)) for name, value in tree.items()}

@@ -53,7 +53,7 @@ HIDDEN = ("hidden_mean", "hidden_deviation")
 
 
 def world_of(env: Any) -> dict[str, Any]:
-    """What an environment is, apart from what is seen of it, for JSON; of tests' environments there is less to say."""
+    """What an environment is, apart from what is seen of it, for JSON. Entries that it lacks are left out."""
     code = getattr(getattr(env, "task", None), "code", None)
     return ({} if code is None else code.in_files) | {
         "task": getattr(getattr(env, "task", None), "name", type(env).__name__),
@@ -345,7 +345,7 @@ def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def nested(leaves: Mapping[str, Any]) -> dict[str, Any]:
-    """The other way round."""
+    """Nested dictionaries of leaves by path: the inverse of `flat`."""
     tree: dict[str, Any] = {}
     for path, value in leaves.items():
         *folders, name = path.split("/")

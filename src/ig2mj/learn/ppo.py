@@ -62,7 +62,7 @@ class PPOConfig:
 
 @struct.dataclass
 class PPOLearner:
-    """All that is learned. `updates`: gradient steps so far."""
+    """What a run learns: weights, the optimizer's state and running statistics. `updates`: gradient steps so far."""
 
     actor: Any
     value: Any

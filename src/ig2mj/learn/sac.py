@@ -100,7 +100,10 @@ class SACConfig:
 
 @struct.dataclass
 class SACLearner:
-    """All that is learned. `updates`: of the critics so far. `progress`: share of the run that is over."""
+    """What a run learns: weights, the optimizer's state and running statistics.
+
+    `updates`: of the critics so far. `progress`: share of the run that is over.
+    """
 
     actor: Any
     critic: Any

@@ -120,7 +120,7 @@ class ManyDevices:
         return found
 
     def buffer(self) -> Any:
-        """What belongs to the worlds, at first, each part where it belongs."""
+        """The algorithm's buffer at the start of a run, each part on its device."""
         shardings = jax.tree.map(lambda spec: NamedSharding(self._mesh, spec), self._buffer_specs)
         return jax.jit(lambda: self._algorithm.buffer(self.num_worlds), out_shardings=shardings)()
 

@@ -91,7 +91,7 @@ def train(
       depends: what makes the run what it is; a checkpoint of another is refused.
       learner: what to begin with; None: untrained.
       devices: where several are to share the work; `env` is then one device's part of the worlds, and the algorithm
-        knows the axis (`iteration.ManyDevices`).
+        knows the axis (`several_devices.ManyDevices`).
       team: the processes whose devices they are; the first one reads and writes the run's folder. None: this one alone.
       kept: called by the first process after every checkpoint with what was learned and the last report.
       compiled: called once, when everything is compiled and before the clock begins.

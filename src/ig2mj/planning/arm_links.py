@@ -1,4 +1,4 @@
-"""Where the links of an arm are (`LinkSpheres`), and ways of it in the space of its joints (`ArmWay`).
+"""Spheres around the links of an arm (`LinkSpheres`), and paths in its joint space (`ArmWay`).
 
 Axes: J joints of the arm, N postures, S spheres.
 """

@@ -1,4 +1,4 @@
-"""`ArmModel`: what the joints of an arm do while its hand moves, and postures that bring the hand somewhere.
+"""`ArmModel`: joint trajectories of an arm along paths of its hand, and inverse kinematics.
 
 Axes: J joints of the arm, N postures, P points of a way, T agent steps.
 """

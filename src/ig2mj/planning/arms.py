@@ -1,4 +1,4 @@
-"""Hands on arms: how a robot with wheels, an arm and a gripper moves its hand (`ArmBody`), and where the arm goes.
+"""`ArmBody`: how a robot with wheels, one arm and a gripper moves its hand, and which paths its arm can follow.
 
 A hand on an arm is moved as a floating one is: by positions and orientations of its grasp point. Each agent step asks
 the arm's inverse kinematics for a small displacement. `ArmModel` knows what the joints do then, so that a way of the

@@ -1,4 +1,4 @@
-"""`PlanningAway`: plans for worlds that are stepped somewhere else, from copies of them.
+"""`PlanningAway`: plans for worlds that another process steps, from copies of them.
 
     planning = PlanningAway(scene, model, initial, goal)
     answer = planning.begin(world, number, copy)           # a program, or the result of an episode
@@ -8,7 +8,7 @@ Whoever steps the worlds follows the programs (`ig2mj.planning.execution`) and s
 has ended. Between two such calls nothing is known of the world, and nothing else is needed. The copy is loaded into a
 world of the native engine, so worlds may be those of any engine.
 
-Axes: none; a copy is of one world.
+A copy is of one world, so that no array has a world axis of its own.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 
 Answer = Program | EpisodeResult
-"""What a world does next, or what became of its episode."""
+"""The next program of a world, or the result of its episode."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class WorldCopy:
 
 
 class LoadedStage:
-    """One world that is whatever was loaded last; see `ig2mj.planning.stage.Stage`."""
+    """One world in the state that was loaded last; see `ig2mj.planning.stage.Stage`."""
 
     agent, num_worlds = 0, 1
 

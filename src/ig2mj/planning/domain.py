@@ -1,4 +1,4 @@
-"""`Domain`: what of a scene matters to a task planner: which objects open, clean, wet, cut, heat, cool and bear."""
+"""`Domain`: constants of a scene for task planners: which objects open, clean, wet, cut, heat, cool and support."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Driving to where a primitive is carried out, with what the hands hold.
+"""Driving to a stance, with what the hands hold.
 
 What is held turns with the robot. Where there is no room to turn with it, the robot turns farther off and comes the
 last part of the way straight ahead, and it backs off straight before it turns again.

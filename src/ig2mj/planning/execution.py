@@ -1,4 +1,4 @@
-"""Following motion programs in a batch of worlds: `start(programs)`, then `advance(view)` once for each agent step.
+"""Execution of motion programs in a batch of worlds: `start(programs)`, then `advance(view)` once for each agent step.
 
 Axes: W worlds, n numbers of the robot's action.
 """
@@ -29,7 +29,7 @@ RISEN = 0.03
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Carry:
-    """What following programs remembers.
+    """State of the execution.
 
     Attributes:
       programs: of all worlds. phase: number of the present one. steps: agent steps in it. status: of each world.

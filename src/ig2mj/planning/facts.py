@@ -1,4 +1,4 @@
-"""`Facts`: what holds in one world of a batch, asked atom by atom; each is evaluated once.
+"""`Facts`: truth of atoms in one world of a batch; each atom is evaluated once.
 
 Axes: W worlds.
 """
@@ -21,7 +21,7 @@ from ig2mj.states.world import ExtendedStates
 
 
 class Facts:
-    """One world as it was when this was made.
+    """The facts of one world at the time of construction.
 
     Attributes:
       domain: constants. view, states: of this world, with a world axis of length 1.

@@ -1,4 +1,4 @@
-"""`BaseFootprint`: the space that a robot and what it holds take up when it drives: discs about its axis, by height."""
+"""`BaseFootprint`: the space that a robot and what it holds occupy while driving: discs about its axis, by height."""
 
 from __future__ import annotations
 

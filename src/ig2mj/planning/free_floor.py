@@ -1,4 +1,4 @@
-"""`FreeFloor`: where a robot can stand in one world, and ways over it.
+"""`FreeFloor`: where a robot can stand in one world, and paths between these places.
 
 Axes: N points of a way, h and w cells of the map along y and x.
 """

@@ -1,11 +1,11 @@
-"""`MotionPlanner`: ways of a robot's base over the floor of a home, and of its hands.
+"""`MotionPlanner`: paths of a robot's base, hands and arm.
 
     planner = MotionPlanner(simulation.scene)
     plan = planner.plan_base(simulation.view, (1.0, -2.0))
     plan.points            # [N, 2] m, the first is where the robot is
-    plan.reason            # "" or why there is no way
+    plan.reason            # "" or why there is no path
 
-Axes: N points of a way, h and w cells of the map along y and x.
+Axes: N points of a path, h and w cells of the map along y and x.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ HAND_CHECKS = 4000
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BasePlan:
-    """A way over the floor, or why there is none.
+    """A path over the floor, or why there is none.
 
     Attributes:
       points: [N, 2] m, world frame; the first is the robot's position. yaw: rad, at the end; None: any.
-      length: m. reason: "" for a way, "no_base": the goal is not free, "no_path": no way leads there.
-      detail: the reason in words. doors: shut doors without which there would be a way.
+      length: m. reason: "" for a path, "no_base": the goal is not free, "no_path": no path leads there.
+      detail: the reason in words. doors: shut doors without which there would be a path.
     """
 
     points: Float[np.ndarray, "N 2"]
@@ -62,13 +62,13 @@ class BasePlan:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HandPlan:
-    """A way of a hand, or why there is none.
+    """A path of a hand, or why there is none.
 
     Attributes:
       points: [N, 3] m, world frame, of the hand's grasp point; the first is where it is.
       quats: [N, 4] w-x-y-z, world frame, of the palm at each point; it turns evenly in between.
-      length: m. reason: "" for a way, "no_base": the goal is out of the hand's reach from where the base stands,
-        "no_grasp": the hand does not fit there, "no_path": no way leads there.
+      length: m. reason: "" for a path, "no_base": the goal is out of the hand's reach from where the base stands,
+        "no_grasp": the hand does not fit there, "no_path": no path leads there.
       detail: the reason in words. method: "straight", "via" or "rrt_connect".
     """
 
@@ -82,13 +82,13 @@ class HandPlan:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ArmPlan:
-    """A way of an arm, or why there is none.
+    """A path of an arm, or why there is none.
 
     Attributes:
       joints: [N, J] rad or m, of the joints `names`, in straight lines; the first is where they are.
       names: of the joints, from the base to the hand, as the scene names them.
-      reason: "" for a way, "no_base": no posture brings the hand there from where the base stands, "no_grasp": in none
-        of them the arm has room, "no_path": no way leads there.
+      reason: "" for a path, "no_base": no posture brings the hand there from where the base stands, "no_grasp": in none
+        of them the arm has room, "no_path": no path leads there.
       detail: the reason in words. method: "straight" or "rrt_connect".
     """
 

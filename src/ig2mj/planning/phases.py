@@ -1,4 +1,4 @@
-"""Motion programs: what a robot does phase by phase, as data, and as arrays of a batch of worlds.
+"""Motion programs: phases of a robot's motion as data, and as arrays over a batch of worlds.
 
 A primitive plans a program on the host (`list[Phase]`); `ig2mj.planning.execution` follows the programs of all worlds
 together. A phase moves the base, a hand, or both, and ends by what it says, or after a limit of agent steps.

@@ -214,7 +214,7 @@ class PhysicsRung:
         return self._programs[world]
 
     def proceed(self, world: int, reason: str, seconds: float) -> dict[int, Outcome]:
-        """The program of a world has ended where somebody else follows it (`ig2mj.planning.away`).
+        """Continues after the program of a world has ended in another process (`ig2mj.planning.away`).
 
         Args:
           reason: why it failed, "" for success. seconds: simulated s that it took.
@@ -237,8 +237,8 @@ class PhysicsRung:
         return ended
 
     def command(self) -> Float[np.ndarray, "W n"]:
-        """The robot's action of the next agent step in every world, in its controller's units. Whoever takes the step
-        calls `follow` after it."""
+        """The robot's action of the next agent step in every world, in its controller's units. The caller takes
+        the step and then calls `follow`."""
         action, self._carry = execution.advance(self.body, self.stage.agent, self._carry, self.stage.view)
         return action
 
@@ -249,8 +249,7 @@ class PhysicsRung:
         self._followed()
 
     def follow(self) -> dict[int, Outcome]:
-        """What the agent step after `command` has led to: worlds go on with their next programs. Outcomes of the worlds
-        whose primitives have ended."""
+        """Continues all worlds after the agent step of `command`; gives the outcomes of primitives that have ended."""
         self._followed()
         return self.take_ended()
 

@@ -1,4 +1,4 @@
-"""Primitives in physics: what the robot does for each, as programs that are planned on the host one after another.
+"""Primitives in physics, as sequences of motion programs that are planned on the host.
 
 A primitive is a generator: it yields motion programs (`list[Phase]`), is sent the reason why each failed ("" for
 success), and returns its outcome. It plans every program from the world as it then is, tries again by itself with

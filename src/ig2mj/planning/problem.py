@@ -1,4 +1,4 @@
-"""`Problem`: what is to be solved: a household, a goal in it, and start states.
+"""`Problem`: a household, a goal in it, and start states.
 
 problem_of("activity NAME")                                   the activity's goal and start states
 problem_of("small_home", "(inside apple_0 fridge_0)")         a goal of one's own, from the scene's start

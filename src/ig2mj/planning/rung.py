@@ -1,7 +1,7 @@
-"""`Rung`: what carries out the steps of a plan, in some worlds at once.
+"""`Rung`: carries out the steps of plans, in several worlds at once.
 
 Three rungs have this interface: *symbolic* sets states, *kinematic* plans and checks motion and sets states, *physics*
-acts. What fails on a rung and not on the one below it is a fault of what the rung adds.
+acts. A failure that occurs on one rung and not on the rung below it is caused by what the rung adds.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Rung(Protocol):
     def num_worlds(self) -> int: ...
 
     def facts(self, world: int) -> Facts:
-        """What holds in a world now. To be read before anything else is asked of the rung."""
+        """What holds in a world now; valid until the rung's next method is called."""
         ...
 
     def begin(self, world: int, step: Step) -> None:
@@ -34,7 +34,7 @@ class Rung(Protocol):
         ...
 
     def advance(self) -> dict[int, Outcome]:
-        """Goes on until the primitive of at least one world has ended; outcomes of the worlds whose primitives have."""
+        """Continues until the primitive of at least one world has ended. Returns the outcomes of ended primitives."""
         ...
 
     def ended(self, world: int) -> str | None:

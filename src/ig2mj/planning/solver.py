@@ -33,7 +33,7 @@ class StepRecord:
 
 @dataclasses.dataclass(frozen=True)
 class EpisodeResult:
-    """What became of one episode.
+    """Result of one episode.
 
     Attributes:
       success: the goal holds at the end. q: partial credit (`ig2mj.predicates.quality.quality`).
@@ -52,7 +52,7 @@ class EpisodeResult:
 
 
 Watch = Callable[[int, TaskPlan, Sequence[StepRecord]], None]
-"""Told of each new plan: number of the world, the plan, the steps before it."""
+"""Called with each new plan: number of the world, the plan, the steps before it."""
 
 
 def unwatched(world: int, plan: TaskPlan, records: Sequence[StepRecord]) -> None:
@@ -111,7 +111,7 @@ def solve(
 
 
 class Solving:
-    """Episodes that are being solved, for those who advance the rung themselves. Arguments and errors as of `solve`."""
+    """Episodes that are being solved, where the caller advances the rung. Arguments and errors as of `solve`."""
 
     def __init__(
         self,
@@ -151,7 +151,7 @@ class Solving:
         return max((e.planned for e in self._episodes.values()), default=0)
 
     def take(self, outcomes: Mapping[int, Outcome]) -> None:
-        """Goes on with the worlds whose primitives have ended."""
+        """Continues the worlds whose primitives have ended."""
         for world, outcome in outcomes.items():
             episode = self._episodes[world]
             assert episode.plan is not None

@@ -1,4 +1,4 @@
-"""`Stage`: worlds in which a robot acts: what the physics rung and a robot's `do` need of a batch or of one world.
+"""`Stage`: the interface of worlds in which a robot carries out primitives.
 
 Axes: W worlds, n numbers of a robot's action.
 """

@@ -1,4 +1,4 @@
-"""Where a robot starts that is to solve a problem, and doors between rooms, which stand open or shut."""
+"""Where a robot starts to solve a problem, and doors between rooms, which stand open or shut."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""`Step` and `Outcome`: what is asked of a primitive, and how it ended; `PRIMITIVES` lists all primitives.
+"""`Step` and `Outcome`: a request to a primitive, and its result. `PRIMITIVES` lists all primitives.
 
 A primitive is named by a verb. Its arguments are names of objects or rooms of the scene, the object that it acts on
-first. It ends by a predicate, not by an error of position.
+first. It ends when a predicate holds, not when a position is reached.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ class Step:
 
     @property
     def object(self) -> str:
-        """What it acts on."""
+        """Name of the object that it acts on."""
         return self.arguments[0]
 
     @property

@@ -32,7 +32,7 @@ from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.pool import Pool
 
 WORK = 200
-"""Units of a placement (`ig2mj.sampling.placement.Budget`)."""
+"""Units of a placement (`ig2mj.sampling.budget.Budget`)."""
 
 
 @dataclasses.dataclass

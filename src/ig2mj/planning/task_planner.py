@@ -45,7 +45,7 @@ PLACING, FAILED, REMEMBERED = 2.0, 3.0, 4
 
 @dataclasses.dataclass(frozen=True)
 class TaskPlan:
-    """What is left to do in one world.
+    """The remaining steps in one world.
 
     Attributes:
       steps: in order; none for conditions that have failed `GIVE_UP` times.
@@ -63,7 +63,7 @@ class TaskPlan:
 
 
 class TaskPlanner:
-    """Plans for one goal of one scene and robot. It remembers nothing: any number of worlds share it."""
+    """Plans for one goal of one scene and robot. It has no state, so that any number of worlds share it."""
 
     def __init__(self, domain: Domain, goal: CompiledExpression):
         """

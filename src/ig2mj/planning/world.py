@@ -1,4 +1,4 @@
-"""`PlannedWorld`: one world of a stage as primitives plan in it: the robot's pose, its hands, what is where."""
+"""`PlannedWorld`: one world of a stage, with the queries that primitives plan with. Positions are in m, world frame."""
 
 from __future__ import annotations
 

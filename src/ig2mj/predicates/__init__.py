@@ -1,6 +1,6 @@
 """Logical predicates (paper table A.1) and the logic over them.
 
-`PREDICATES` lists all 19; `compile_expression` turns an expression, which may be one predicate of named objects, into a
+`PREDICATES` lists them; `compile_expression` turns an expression, which may be one predicate of named objects, into a
 function of all worlds.
 """
 

@@ -1,7 +1,7 @@
 """`Predicate`: one logical predicate, and `Context`: all that it may read.
 
 A predicate is evaluated for a list of argument tuples in all worlds at once. Arguments are indices: objects, or rooms
-where the predicate says so. It never asks for more pairs than it is given.
+where the predicate says so. It computes no more pairs than it is given.
 
 Axes: W worlds, P argument tuples, K arguments of a predicate (1 or 2).
 """
@@ -46,7 +46,7 @@ class Context:
         return self.view.object_com.shape[0]
 
     def known(self, objects: Int[AnyArray, "P"]) -> Bool[Array, "W P"]:
-        """Whether the places of objects are finite; a NaN pose never makes a predicate true."""
+        """Whether the positions of objects are finite; a NaN pose never makes a predicate true."""
         return finite(self.view)[:, objects]
 
     def none(self, arguments: Arguments) -> Bool[Array, "W P"]:
@@ -78,8 +78,8 @@ class Predicate:
     Attributes:
       name: snake_case. arguments: what each argument is; an agent's index is the number of objects plus its own.
         evaluate: truth for argument tuples. ability: without it the first argument's answer is False.
-        aliases: other names (iGibson's, BDDL's tokens, the paper's). queries: relations it needs. why: for people, the
-        numbers behind the answer in one world. per_object: see `of_states`. of_arguments: of what a view says of
+        aliases: other names (iGibson's, BDDL's tokens, the paper's). queries: relations it needs. why: text with
+        the numbers behind the answer in one world. per_object: see `of_states`. of_arguments: of what a view says of
         objects it reads only its arguments (their links, bodies and joints), and floors (`goal_rows`).
       set: new fields of the states in which it is true, or false, of the masked objects; of plug-ins' predicates of one
         object.

@@ -1,4 +1,4 @@
-"""The ground reading of an expression that costs least, found directly: no readings are enumerated.
+"""The cheapest ground reading of an expression, found without enumerating readings.
 
 A disjunction is its cheaper part, an `Exactly` the parts whose truth gains most, a `Pairing` an assignment of least
 cost. Where parts that must hold together want an atom both true and false, the search branches on that atom.
@@ -22,7 +22,7 @@ Cost = Callable[[Atom, bool], float]
 """What it costs that an atom is true, or false; infinite where that cannot be."""
 
 FORBIDDEN = 1e9
-"""Cost in an assignment of a pair that cannot be."""
+"""Cost of an impossible pair in an assignment."""
 
 BRANCHES = 400
 """Branches of a search after which a contradiction stands."""
@@ -56,7 +56,7 @@ def cheapest(
 
     Args:
       expression: ground. cost: of literals; may be negative. Each use of a literal counts.
-      incompatible: what cannot be together, though each can be.
+      incompatible: atoms that are possible one by one, but not together.
     """
     first = _choice(expression, cost, expected)
     numbers = itertools.count()

@@ -45,10 +45,10 @@ Groups = Mapping[str, Sequence[str]]
 
 @struct.dataclass
 class GoalStatus:
-    """How far an expression is fulfilled in every world.
+    """Truth and progress of an expression in every world.
 
     Attributes:
-      holds: it is true. fraction: of its literals that are as they should be (`evaluate.fraction`).
+      holds: it is true. fraction: share of its literals that have the required truth (`evaluate.fraction`).
       literals: truth of every literal, in the order of `CompiledExpression.atoms`.
     """
 
@@ -128,7 +128,7 @@ class CompiledExpression:
         return self.status_of(self.questions.facts(self.literals, states, view), states)
 
     def explain(self, world: WorldState, index: int = 0) -> str:
-        """What is still missing in one world, as text to read."""
+        """What is still missing in one world, as readable text."""
         from ig2mj.predicates.explain import explain
 
         return explain(self, _kept(world.states), world.view, index)

@@ -1,4 +1,4 @@
-"""Truth of a ground expression from the truth of its atoms, and how much of it is fulfilled.
+"""Truth of a ground expression, and the share of it that is fulfilled, from the truth of its atoms.
 
 Both are unrolled while tracing; every value is an array over worlds. Plain literals (atoms, and atoms with a `not`) of
 one connective are taken together as one array, so that a goal of many literals stays a few operations.
@@ -44,7 +44,7 @@ class Truth:
 
 
 class Score(NamedTuple):
-    """How near an expression is to its desired truth, 0 to 1, and for how many literals that counts."""
+    """Progress of an expression towards its required truth, 0 to 1, and its weight in literals."""
 
     value: Float[Array, "W"]
     weight: float

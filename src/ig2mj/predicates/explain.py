@@ -1,4 +1,4 @@
-"""Why an expression does not hold, for people: the tree with what is missing, and the numbers behind it."""
+"""Why an expression does not hold, as text: the tree with what is missing, and the numbers behind it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def truth_in(
     compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int
 ) -> tuple[Context, dict[Atom, bool]]:
-    """What one world is like, and which atoms of the expression hold in it."""
+    """The context of one world, and the truth of the expression's atoms in it."""
     states, view = jax.tree.map(lambda leaf: np.asarray(leaf)[world : world + 1], (states, view))
     questions = compiled.questions or HostQueries.of(compiled.model)
     context = Context(compiled.model, states, view, questions.relations(states, view))

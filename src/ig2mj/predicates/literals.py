@@ -54,7 +54,7 @@ class Literal:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Literals:
-    """Literals of a scene, ready to be evaluated in one go.
+    """Literals of a scene, which are evaluated together.
 
     Evaluating has two parts: `facts`, the truth of every instance (a predicate of object indices, each once), and
     `combine`, which makes literals of them.

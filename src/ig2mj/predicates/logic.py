@@ -94,7 +94,7 @@ class ForN(Expression):
 
 @dataclasses.dataclass(frozen=True)
 class ForPairs(Expression):
-    """Holds for pairs until the smaller group is used up."""
+    """As many objects of each group as the smaller one has take part in pairs for which it holds."""
 
     first: tuple[str, str]  # variable, group
     second: tuple[str, str]

@@ -1,4 +1,4 @@
-"""An expression as a tree of what holds and what does not, and why: for panels and other readers of parts."""
+"""An expression as a tree of parts with their truth and the reason for it, for panels."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class GoalPart:
 
     @property
     def fine(self) -> bool:
-        """It is as it should be."""
+        """The part has the required truth."""
         return self.holds == self.expected
 
 

@@ -1,4 +1,4 @@
-"""From truth to state: placements that make predicates true, states set by name, disturbed and settled scenes."""
+"""Sampling of states: placements that make predicates true, states set by name, disturbed and settled scenes."""
 
 from ig2mj.process.public_names import offer_modules
 from ig2mj.sampling.conditions import Condition, read_conditions

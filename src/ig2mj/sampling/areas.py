@@ -1,4 +1,4 @@
-"""Where an object may be put so that several conditions hold of it: what one proposes, narrowed by the others."""
+"""Where an object may be put so that several conditions hold: the areas of one condition, narrowed by the others."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ig2mj.sampling.rules.borne_by import borne_by
 from ig2mj.states.model import StateModel
 
 WITHOUT_CONTACT = frozenset(("inside", "next_to", "under"))
-"""Placements that can be asked of an object that has not come to rest yet."""
+"""Placements that can be evaluated before the object has come to rest."""
 
 
 def areas_for(query: SceneQuery, model: StateModel, name: str, requested: Sequence[Condition]) -> Areas:

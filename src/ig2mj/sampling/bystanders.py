@@ -1,8 +1,9 @@
 """Objects that a change to the world must not move, compared with an unchanged copy of the world.
 
-A placement, or a door that is opened, must push nothing away. Objects that move by themselves (an apple that still
-rolls, a cup that a robot carries) do not count. A copy of the world without the change, stepped as often, distinguishes
-the two. It is stepped only if something has moved, and all changes tried from one state share its trajectory.
+A placement, or the opening of a door, must not push other objects away. Objects that move by themselves (an apple that
+still rolls, a cup that a robot carries) do not count. A copy of the world without the change, stepped as often,
+distinguishes the two. It is stepped only if something has moved, and all changes tried from one state share its
+trajectory.
 
 Axes: O objects, J openable joints, B bodies of agents.
 """

@@ -180,7 +180,7 @@ class ColumnMap:
         self._local = matrices_on_host(tables.piece_quat)
 
     def update(self, body_pos: Float[np.ndarray, "B 3"], body_rotation: Float[np.ndarray, "B 3 3"]) -> None:
-        """Takes over where the bodies are; forgets the columns of pieces that moved."""
+        """Updates the poses of bodies, and discards the columns of pieces that moved."""
         body = self.tables.piece_body
         pos = body_pos[body] + np.einsum("kij,kj->ki", body_rotation[body], self.tables.piece_pos)
         rotation = body_rotation[body] @ self._local

@@ -48,11 +48,11 @@ SETTLE_SECONDS = 10.0
 
 @dataclasses.dataclass(frozen=True)
 class Sampled:
-    """What `sample` made.
+    """Result of `sample`.
 
     Attributes:
-      pool: the rows that succeeded; None where none did. rows: their numbers. requested: how many were wanted.
-      rejected: how often which reason turned a candidate down, in all attempts. seconds: wall time.
+      pool: the rows that succeeded; None where none did. rows: their numbers. requested: their requested number.
+      rejected: number of rejected candidates by reason, in all attempts. seconds: wall time.
       failed: by the number of a row, why it could not even be tried (only where a journal was given).
     """
 

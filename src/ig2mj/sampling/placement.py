@@ -31,7 +31,7 @@ LIFT = 0.002
 """Metres by which an object is put above where it will rest, so that rounding to cells makes it stand in nothing."""
 
 PENETRATION = 0.001
-"""Metres. An object that stands deeper in something when it is let go is not let go."""
+"""Metres. A candidate that penetrates something by more is lifted, or rejected."""
 
 RESTING_PENETRATION = 0.002
 """Metres. No sampled state stands deeper in anything (at rest, by gravity)."""
@@ -166,7 +166,7 @@ class Placer:
         """Puts an object into an area so that `truth` holds afterwards; leaves the world as it was where it cannot.
 
         Args:
-          areas: see `Areas`. truth: asked after the object has settled. rejected: counts are added to it.
+          areas: see `Areas`. truth: evaluated after the object has settled. rejected: counters that are increased.
           along: an object with whose sides every second orientation is aligned, so that a pillow finds its place in a
             cabinet that it all but fills; -1: all are turned by any angle.
           flat: of its stable orientations, the object takes one in which it is lowest, so that it can bear something.

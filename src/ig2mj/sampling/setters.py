@@ -39,7 +39,7 @@ Value = bool | float | int
 
 
 class Change(NamedTuple):
-    """What setting a state comes to.
+    """The changes by which a state is set.
 
     Attributes:
       states: the new ones. swap: teleports, or None. joints: positions [W, J] of openable joints and which move, or

@@ -34,8 +34,8 @@ TRIES = 4
 """Times as many rows as asked for may be tried before giving up."""
 
 OVERLAP, RESTING_OVERLAP = 0.002, 0.004
-"""Metres deeper than at the start that a disturbed object may stand in something: as it is let go, and at rest. What
-stands deeper and is asleep flies off as soon as something wakes it."""
+"""Metres by which a disturbed object may penetrate something more than at the start: when it is released, and at rest.
+A sleeping object that penetrates more is thrown off when it wakes."""
 
 TAKEN_BACK = 3
 """Times that disturbed objects are looked through; each time those that overlap go back to where they were."""

@@ -2,7 +2,7 @@
 
 Points are spread evenly by area over the outside of the collision pieces of all bodies of the object, where the surface
 does not face down by more than 45 degrees below the horizontal: iGibson's limit of 135 degrees to the vertical
-(iGibson's particles.py). Floors take them on top alone: their sides are under the house.
+(iGibson's particles.py). Floors get them on top only, because their sides are under the house.
 """
 
 from __future__ import annotations

@@ -53,8 +53,8 @@ class SensorOptions:
       lidar_beams: of the lidar, from 15 degrees below its horizon to 15 above. lidar_columns: rays of a beam in a
         quarter turn. lidar_near, lidar_far: m, its range; nearer is the robot's own head.
       particles: the most particles of dust, stains and water that an image shows.
-      rows: of all images the first row that is made and the first below those; the others are as if nothing were
-        there. For those who look at no others: on a GPU they cost nothing then. None: all.
+      rows: the first row of images that is rendered, and the first below those; pixels of other rows read as if
+        nothing were there, and cost nothing on a GPU. None: all rows.
       shadows: whether images have them; they cost six times the rest on the native engine, twice on a GPU.
       looks: how images show the home: one of `ig2mj.scene.scene.LOOKS`. Policies that see images were trained with
         `CAMERA_LOOKS`.
@@ -180,7 +180,7 @@ class Setup:
 
 @struct.dataclass
 class SensorMemory:
-    """What was where at the last reading: from which flow is computed. World frame.
+    """Poses at the last reading, from which flow is computed. World frame, m and w-x-y-z.
 
     Attributes:
       eye_pos, eye_quat: of the camera. body_pos, body_quat: of all bodies.

@@ -1,4 +1,4 @@
-"""Which particles a camera shows: the first so many that are there, of dust, stains and water, in every world.
+"""Which particles a camera shows: the first `count` that exist, of dust, stains and water, in every world.
 
 Axes: W worlds, N particles of all kinds, S slots.
 """
@@ -49,7 +49,7 @@ class Slots:
 
 
 def fill_slots(model: StateModel, states: ExtendedStates, view: PhysicsView, count: int) -> Slots:
-    """The particles that are there, in the order dust, stains, water; those past `count` are not shown. Pure."""
+    """The particles that exist, in the order dust, stains, water; those after `count` are not shown. Pure."""
     p, worlds = model.parameters, states.temperature.shape[0]
     dust_rows, stain_rows, sources = len(p.dust_rows), len(p.stain_rows), len(p.water_object)
     patches = stain_sizes(model.tables.object_bbox[p.stain_rows]) / 2 if stain_rows else np.zeros((0, NUM_PARTICLES))

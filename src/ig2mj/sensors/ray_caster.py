@@ -1,10 +1,10 @@
 """Rays against merged meshes (`ig2mj.sensors.merged_meshes`), in MJX-Warp's ray caster.
 
 Only the function that finds what a ray hits is ours; the kernel around it is upstream's but for its light
-(`ig2mj.sensors.shading`). Rays first look for what never moves, in one tree that all worlds share, and then for what
-does, as far as they came: upstream takes everything in the order of a tree. Hits are the same up to rounding, but for
-surfaces in the same place: there upstream shows the geom with the larger number, and within a merged mesh either is
-shown.
+(`ig2mj.sensors.shading`). A ray is first tested against what never moves, in one tree that all worlds share, and then,
+up to that distance, against what moves: upstream tests all geoms in the order of one tree. Hits are the same up to
+rounding, but for surfaces in the same place: there upstream shows the geom with the larger number, and within a merged
+mesh either is shown.
 """
 
 # Warp's kernels only look like Python, so that type checkers must leave them alone:

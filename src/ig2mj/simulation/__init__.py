@@ -1,4 +1,4 @@
-"""One world, for people: `Simulation`."""
+"""`Simulation`: one world, with objects by name."""
 
 from ig2mj.process.public_names import offer_modules
 from ig2mj.simulation.simulation import Simulation

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class SimulationStage:
-    """A simulation as the physics rung sees it; one robot acts, the others stay as they are."""
+    """Lets the physics rung act in a simulation, with one robot; the others keep their controls."""
 
     def __init__(self, simulation: Simulation, agent: int = 0):
         self._simulation, self.agent = simulation, agent

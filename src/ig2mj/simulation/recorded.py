@@ -1,4 +1,4 @@
-"""`Recorded`: what a `Simulation` offers about recordings of itself; `recording` is imported when it is used."""
+"""`Recorded`: `Simulation.record` and `replay`; `recording` is imported when they are used."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Recorded:
     def replay(self, file: str | os.PathLike) -> Replayed:
         """Takes every control step of a recording again, and compares every byte of every frame.
 
-        The world is the recording's last one afterwards. Natively it comes out the same.
+        The world is the recording's last one afterwards. On the native engine it is the same to the bit.
 
         Raises:
           InputError: the file is broken, or of another scene, engine, version or way of grasping; it names the pair.

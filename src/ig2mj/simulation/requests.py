@@ -51,7 +51,7 @@ DRAWS, WORK = 20, 400
 """Draws until a home has something that can be asked; units of sampling what must hold first."""
 
 CRASHED = "crashed"
-"""Reason of a request at which something broke, next to `ig2mj.planning.REASONS`."""
+"""Reason of a request that raised an error, next to `ig2mj.planning.REASONS`."""
 
 
 def home_of(primitive: str, number: int, seed: int) -> str:

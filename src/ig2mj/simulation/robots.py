@@ -115,6 +115,6 @@ class RobotsOfWorld:
 
 
 def put_row(simulation: Simulation, row: Row) -> None:
-    """The world becomes a sampled one: hands hold what it brings along; controllers remember what they did."""
+    """Replaces the world by a sampled one: hands hold what it contains, controllers keep their states."""
     simulation.physics = simulation.engine.load(simulation.physics, row.physics)
     simulation._put(states=row.states)

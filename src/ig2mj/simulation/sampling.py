@@ -65,7 +65,7 @@ class WorldSampler:
           physics, states: as for `sample`. value: open or not.
 
         Raises:
-          StateError: whatever is drawn shoves something.
+          StateError: every drawn position shoves something.
         """
         query = self._sampler_in(physics, states).query
         query.load(physics)

@@ -1,4 +1,4 @@
-"""`Simulation`: one world, for people: step it, move objects by name, ask what is true of it, look at it.
+"""`Simulation`: one world: step it, move objects by name, evaluate predicates, render it.
 
     simulation = ig2mj.Simulation("small_home")
     simulation.set_state("toggled_on", "stove_0", True)
@@ -116,7 +116,7 @@ class Simulation(Recorded):
     def from_snapshot(
         cls, scene: Scene, snapshot: Snapshot, states: ExtendedStates | None = None, **options: Any
     ) -> Simulation:
-        """Goes on, on the native engine, from a world of another one: how to look at world 1,234 of a batch.
+        """A simulation on the native engine that continues from one world of any engine. To look at world 1,234:
 
             Simulation.from_snapshot(scene, engine.export(batch.world.physics, 1234)).launch_viewer()
 
@@ -142,7 +142,7 @@ class Simulation(Recorded):
 
             simulation.batch, status = simulation.core.step(simulation.batch)
 
-        Steps of a simulation raise no flags: a world that is lost is an error.
+        Steps of a simulation raise no flags: a world that is no longer finite is an error.
         """
         return dataclasses.replace(self._batch, world=self._world)
 
@@ -192,7 +192,7 @@ class Simulation(Recorded):
 
     @property
     def robots(self) -> RobotsOfWorld:
-        """The scene's robots: `simulation.robots.act(action)` lets them act, `.holding` is what is in their hands."""
+        """The scene's robots: `simulation.robots.act(action)` lets them act, `.holding` says what their hands hold."""
         if self._robots is None:
             self._robots = RobotsOfWorld(self)
         return self._robots

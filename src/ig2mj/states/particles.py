@@ -1,4 +1,4 @@
-"""Particles stuck to surfaces: what dust and stains share.
+"""Particles on surfaces: the common part of dust and stains.
 
 A particle is a point with a normal in the frame of a body; it moves with the body for free. It is `placed` when
 sampling put it there and `alive` until something wipes it off. Levels are relative to the placed ones, and `placed` is
@@ -101,7 +101,7 @@ def place(
     minimum: int,
     worlds: Bool[Array, "W"] | None = None,
 ) -> tuple[Particles, Bool[Array, "W"]]:
-    """Puts particles on the object of a row at sampled surface points; those that were there go.
+    """Puts particles on the object of a row at sampled surface points; earlier ones are removed.
 
     Args:
       particles: all rows.

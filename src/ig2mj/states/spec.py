@@ -1,4 +1,4 @@
-"""`StateSpec`: everything there is to know about one extended state, in one place; the state's own file holds it.
+"""`StateSpec`: the complete description of one extended state, which stands in the state's own file.
 
 `registry.SPECS` lists ig2mj's own. All else is derived: the arrays of `ExtendedStates`, what they are at the start and
 what a manifest says of them, what halves inherit at a cut, what can be asked and set by name, what is saved.
@@ -86,7 +86,7 @@ class EventStep:
 
     @classmethod
     def start(cls, model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations) -> EventStep:
-        """The step before anything has happened."""
+        """The step before its first update."""
         shape = states.temperature.shape
         still = Swap.nothing(shape[0], len(model.swap_objects))
         return cls(model, states, view, jnp.zeros(shape, jnp.int32), jnp.zeros(shape, bool), still, relations)
@@ -143,7 +143,7 @@ def given_from_outside(step: Any) -> Any:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class StateSpec:
-    """One extended state. A state that keeps something says all of `KEEPS`; one that is read from physics, none.
+    """One extended state. A state with arrays gives all of `KEEPS`; one that is read from physics gives none.
 
     Attributes:
       name: snake_case.
@@ -166,7 +166,7 @@ class StateSpec:
         (`ig2mj.scene.extras`).
 
     Raises:
-      ValueError: a piece is missing, or there is one too many; `part` is neither.
+      ValueError: a field is missing or superfluous, or `part` is neither "events" nor "heat".
     """
 
     name: str
@@ -213,7 +213,7 @@ class StateSpec:
         """A state that is one number, or one switch, of every object; halves inherit it.
 
         Args:
-          kind: float, int or bool. start: its value in the beginning. settable: by name.
+          kind: float, int or bool. start: its value in the beginning. settable: it can be set by name.
           saved_as: keys of a manifest that mean it; None: its name.
           others: `abilities`, and what else a `StateSpec` has.
         """

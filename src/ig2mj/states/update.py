@@ -62,7 +62,7 @@ def queries(model: StateModel) -> list[Query]:
 
 
 def heat_fields(model: StateModel) -> tuple[str, ...]:
-    """What the second part changes."""
+    """Names of the fields that the second part changes."""
     return tuple(name for spec in (*HEAT, *_added(model, "heat")) for name in spec.fields)
 
 

@@ -33,7 +33,7 @@ class ActionMap:
     """From a task's action to the robot's.
 
     Attributes:
-      names: what each number moves. places: [n] number of the controller's action that it becomes.
+      names: what each number moves. places: [n] index into the controller's action of each.
       scale: [n] by which it is multiplied. rest: [m] the controller's action where nothing moves.
     """
 
@@ -93,11 +93,12 @@ def whole_actions(names: Sequence[str], high: Float[np.ndarray, "n"]) -> ActionM
 def robot_actions(
     names: Sequence[str], controls: Sequence[HandControl] = (), arm: bool = False, gripper: bool = False
 ) -> ActionMap:
-    """The robot's own numbers, -1 to 1, of its drive, and where asked for of its first hand.
+    """The robot's own numbers, -1 to 1: of its drive and, if requested, of its first hand.
 
     Args:
       names: of the robot's action (`Controller.action_names`). controls: of its hands.
-      arm, gripper: the first hand is moved, and closed. What is not asked for stays as it is, open hands open.
+      arm, gripper: the action also moves the first hand, and closes it. Other parts of the robot stay as they are,
+        open hands open.
 
     Raises:
       EngineError: the robot does not drive, or has no hand.

@@ -1,4 +1,4 @@
-"""`Objective`: what a task asks of its worlds, computed after physics: measures, rewards, ends, observations.
+"""`Objective`: a task's measures, rewards, ends of episodes and observations, computed after physics.
 
 Axes: W worlds.
 """
@@ -15,7 +15,7 @@ from ig2mj.predicates.compile import GoalStatus
 from ig2mj.states.world import ExtendedStates
 
 Measures = Any
-"""What an objective must know of the step before: a pytree of arrays that begin with the world axis."""
+"""What an objective must know of the previous step: a pytree of arrays that begin with the world axis."""
 
 
 @runtime_checkable
@@ -65,7 +65,7 @@ class Objective(Protocol):
         ...
 
     def info(self, view: PhysicsView, now: Measures, status: GoalStatus) -> dict[str, Array]:
-        """What is reported of every step besides; "goal_progress" (0..1) among it. Always the same keys."""
+        """Further quantities of every step, "goal_progress" (0..1) among them. The keys are always the same."""
         ...
 
     def observe(

@@ -1,9 +1,9 @@
 """Rewards as differences of potentials, each term by itself (appendix of the paper).
 
 The potential is  w_goal x literals that hold - w_distance x distances + w_pickup x first object is held
-- w_stain x stains that are left;  the reward of a step is how much it grew. Two traps of iGibson's code are avoided: a
-distance that is no longer defined keeps its last value there is (in iGibson it becomes 0, and the agent is paid for
-it), and the baseline is taken at the reset, so that the first step counts, too.
+- w_stain x stains that are left;  the reward of a step is its increase. Two faults of iGibson's code are avoided: a
+distance that is no longer defined keeps its last value (in iGibson it becomes 0, which counts as a gain), and the
+baseline is taken at the reset, so that the first step counts, too.
 
 Axes: W worlds, D distances.
 """
@@ -47,7 +47,7 @@ class Lift:
 
 @struct.dataclass
 class ActivityMeasures:
-    """What the potential is made of, in every world.
+    """Terms of the potential, in every world.
 
     Attributes:
       literals: of the goal that hold (their share, where the weights say so). distances: m.

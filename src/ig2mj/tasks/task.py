@@ -79,7 +79,7 @@ class Acts:
 
 @runtime_checkable
 class TaskLike(Protocol):
-    """What environments of all kinds of tasks have in common.
+    """What tasks of all kinds have in common.
 
     Attributes:
       name: as `ig2mj.make` takes it. summary: one sentence. home: a shipped home. horizon: agent steps of an episode.
@@ -154,7 +154,7 @@ class Fit:
 
 @dataclasses.dataclass(frozen=True)
 class Physical:
-    """What is different in an activity where nothing holds but friction: objects that fit between two fingers.
+    """What differs with "physical" grasping, where only friction holds: objects that fit between two fingers.
 
     Attributes:
       objects: for each variant (`ig2mj.tasks.variants`) what is added to the home in the place of the task's `objects`.

@@ -23,7 +23,7 @@ from ig2mj.scene.paths import scene_folder
 from ig2mj.tasks.task import Task
 
 MOST = 3
-"""Variants of a task, its own objects included. Further models in the library serve other ends."""
+"""Variants of a task, its own objects included. Further models of the library are not counted."""
 
 
 def variants(task: Task) -> int:

@@ -12,7 +12,7 @@ SPHERE, CAPSULE, CYLINDER = GEOM.mjGEOM_SPHERE, GEOM.mjGEOM_CAPSULE, GEOM.mjGEOM
 BOX, ELLIPSOID = GEOM.mjGEOM_BOX, GEOM.mjGEOM_ELLIPSOID
 
 FINGER_FRICTION = 2.5
-"""iGibson's fingers have 500, which in MuJoCo is stiction without end."""
+"""iGibson uses 500, with which contacts in MuJoCo never slip."""
 
 FINGER_HALF, FINGER_Y = (0.032, 0.0065, 0.0125), 0.0085
 """m: half size of a finger, and how far its middle is from its frame, inwards: closed fingers are 1 mm apart."""

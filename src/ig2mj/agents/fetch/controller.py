@@ -55,13 +55,13 @@ STRETCH = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
 """m and rad: goal of a full command."""
 
 EASE = (VELOCITY[CHAIN_JOINTS] / VELOCITY[CHAIN_JOINTS].max()) ** 2
-"""How readily trunk and arm move: squares of their speed limits. With all alike the slow trunk (0.1 m/s) would do most
-of what is vertical, and slow the arm down to a third."""
+"""Weights of trunk and arm in inverse kinematics: squares of their speed limits. With equal weights the slow trunk
+(0.1 m/s) makes most of each vertical movement, and the arm moves at a third of its speed."""
 
 AHEAD, POSTURE = 0.25, 0.005
 """Share of a command that inverse kinematics solves, and of the way to the posture at rest that its iterations make.
 A full command's goal is 0.2 m ahead, of which an action makes a fifth; with the gripper's orientation kept it is often
-out of reach, where iterations wander and the arm came nearly to a stop. What they find for the near goal goes on."""
+out of reach: the iterations do not converge, and the arm nearly stops. What they find for the near goal goes on."""
 
 LEASH = 0.15
 """rad or m that a servo's target may be ahead of its joint: a blocked arm does not push ever harder."""

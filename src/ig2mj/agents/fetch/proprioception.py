@@ -1,4 +1,4 @@
-"""What Fetch feels of itself: iGibson's default list of 41 numbers, and the 49 of its experiments with activities.
+"""Fetch's proprioception: iGibson's default list of 41 numbers, and the 49 of its experiments with activities.
 
 Axes: W worlds, 14 joints in the order of `JOINT_NAMES`.
 """

@@ -56,7 +56,7 @@ FINGER_REACH, FINGER_EDGE, FINGER_FACE = 0.03, 0.0115, 0.0155
 and 0.012). Ours are 6 cm long, and the grasp point is in their middle, where the gripper's frame is."""
 
 LIFTED = 0.007
-"""m: of a pinned base above its place, so that its wheels do not press on the floor for ever."""
+"""m: of a pinned base above its place, so that its wheels do not touch the floor."""
 
 CASTERS = ((0.16, 0.11), (0.16, -0.11), (-0.21, 0.11), (-0.21, -0.11))
 """m: where they stand in the base's frame."""

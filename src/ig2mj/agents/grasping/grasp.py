@@ -200,7 +200,7 @@ class Grasping:
         return not (touching.any() and touching[..., self.scene.tables.graspable_object[self._targets]].any())
 
     def changed(self, before: GraspState, after: GraspState) -> Bool[Array, "W"]:
-        """Worlds whose constraints or dropped contacts are others now: those that `write` is needed for."""
+        """Worlds whose constraints or dropped contacts differ, for which `write` is needed."""
         differs = (before.body != after.body) | (before.held != after.held)
         return differs.any(1)
 

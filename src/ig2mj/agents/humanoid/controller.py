@@ -8,7 +8,7 @@
 | 20-25, 26, 27 | the same of the right hand |
 
 Poses of hands and eye are remembered as targets in the body's frame, so that a zero action holds them there; the body
-has none, so that a zero action leaves it where it has come to. Turns are about the axes of the body's frame. A reset
+has none, so that a zero action leaves it where it is. Turns are about the axes of the body's frame. A reset
 above 0 brings a hand's target back to where the hand is at rest; a hand that is out of its arm's reach, because
 something holds it back, is put there at once (`ig2mj.worlds.hand_resets`).
 

@@ -19,8 +19,8 @@ def add_robot(
 ) -> dict[str, mujoco.MjsBody]:
     """Adds the robot to a scene, its joints at the layout's start: bodies by link. `fixed`: bolted to the world.
 
-    What of its file ties joints and bodies to each other comes along. Its keyframes, its motors and what measures
-    those do not: an agent has a start and servos of its own. Its excludes neither: no two bodies collide anyway.
+    Equalities, tendons and sensors of its file are kept. Keyframes, motors and sensors of motors are not: an agent has
+    its own start and servos. Contact excludes are not needed, because no two bodies of the robot collide.
     """
     own, prefix = named_spec(body.file, body.description.name, name), f"{body.description.name}_"
     own_start = {prefix + joint: at for joint, at in zip(body.scalar_names, body.start(layout), strict=True)}

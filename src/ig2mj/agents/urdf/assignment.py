@@ -74,7 +74,8 @@ def find_layout(
     """The layout of a robot.
 
     Args:
-      body: of this robot. given: what is not to be found but taken, as in a file. where: what errors name.
+      body: of this robot. given: entries that are taken as they are, as in a
+        layout file. where: what errors name.
 
     Raises:
       InputError: an entry is of the wrong kind, the robot cannot be driven so, it has legs, or it steers like a car.

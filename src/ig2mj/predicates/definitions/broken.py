@@ -1,4 +1,4 @@
-"""Broken(o): a blow has broken it."""
+"""Broken(o): an impact has broken it (`ig2mj.states.definitions.broken`)."""
 
 from __future__ import annotations
 

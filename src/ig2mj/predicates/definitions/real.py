@@ -1,4 +1,4 @@
-"""Real(o): o exists. What rules have used up, or have not made yet, does not (`ig2mj.states.substances.things`)."""
+"""Real(o): o exists. What rules have consumed, or have not made yet, does not (`ig2mj.states.substances.things`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sliced(o): it was cut (table A.1). Of a whole that has given way to its halves, both must say so."""
+"""Sliced(o): it was cut (table A.1). A whole that was replaced by halves is sliced if both halves are."""
 
 from __future__ import annotations
 

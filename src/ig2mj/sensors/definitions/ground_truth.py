@@ -1,4 +1,4 @@
-"""`object_poses`, `base_pose` and `eye_pose`: where things really are, which no real sensor tells."""
+"""`object_poses`, `base_pose` and `eye_pose`: true poses, which no real sensor measures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`proprioception`: what the robot feels of itself (`Controller.proprioception`)."""
+"""`proprioception`: the readings of the robot's own joints and hands (`Controller.proprioception`)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Broken(o): a blow has broken it, for good, until it is set otherwise.
+"""Broken(o): an impact has broken it; it stays broken until the state is set.
 
-A blow is a change of velocity within a control step that gravity does not explain, of an object that touches
+An impact is a change of velocity within a control step that gravity does not explain, of an object that touches
 something: the impulse of the contact over the object's mass. Objects whose category is breakable break.
 
 Axes: W worlds, O objects.

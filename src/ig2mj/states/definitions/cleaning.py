@@ -1,4 +1,4 @@
-"""Cleaning tools: what they touch they wipe off (iGibson's cleaning_tool.py).
+"""Cleaning tools remove the particles that they touch (iGibson's cleaning_tool.py).
 
 A tool removes, at once, every particle of an object it touches whose centre is in the world box of its annotated
 cleaning area, or of the whole tool where the model has none. The boxes are Bullet's: local boxes, those of hulls with

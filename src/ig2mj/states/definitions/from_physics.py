@@ -1,4 +1,4 @@
-"""States that every object has and that keep nothing: they are read from physics when they are asked for."""
+"""States of every object that are read from physics and have no arrays of their own."""
 
 from __future__ import annotations
 

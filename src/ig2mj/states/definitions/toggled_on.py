@@ -2,7 +2,7 @@
 
 The paper asks for contact of the agent with the TogglingLink, which is virtual and collides with nothing. iGibson
 realises that as nearness, and so do both sets of rules here: some finger's frame strictly within 0.10 m of the link at
-five consecutive updates flips the switch; staying does not flip it again.
+five consecutive updates flips the switch; a finger that stays does not flip it again.
 
 Axes: W worlds, O objects, B buttons.
 """

@@ -1,4 +1,4 @@
-"""Water: sources let drops fall, drops land, sinks and soakable objects take them (paper tables A.2 to A.4).
+"""Water: sources release drops, which fall; sinks and soakable objects absorb them (paper tables A.2 to A.4).
 
 A drop is a point that falls straight down with a radius, not a body: under gravity alone, held against the collision
 pieces of all objects on the way it falls during the step, so that none is skipped at speed. What it touches first

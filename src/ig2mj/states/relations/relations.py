@@ -1,4 +1,4 @@
-"""`Relations`: answers about pairs of objects in one view, whatever evaluates them.
+"""`Relations`: relations of pairs of objects in one view.
 
 There are two evaluations of the same formulas (adjacency.py, containment.py, nearness.py): of pairs that are known
 before tracing, all together (`plan.RelationPlan`), and of traced pairs, one after the other (`traced.TracedRelations`).

@@ -1,4 +1,4 @@
-"""Working off in turns what a mask chooses: which places come next, and putting the answers where they belong.
+"""`Worklist`: computes the entries of a mask chunk by chunk, and puts the results in their places.
 
 Without scatters where that can be: XLA compiles each into kernels of its own, and no program with one into a single
 function (`ig2mj.process.xla_small_call`).

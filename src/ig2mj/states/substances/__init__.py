@@ -1,1 +1,2 @@
-"""Substances in containers and on objects (docs/design/substances.md). A scene that names none has no part of it."""
+"""Substances in containers and on objects (docs/design/substances.md). Scenes that name none do not have these
+states."""

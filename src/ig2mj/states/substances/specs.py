@@ -15,4 +15,4 @@ COAT = dataclasses.replace(
 """What tools wipe off and machines wash, and then what transition rules make of contents and coats."""
 
 SUBSTANCE_STATES: tuple[StateSpec, ...] = (volume.SPEC, COAT, things.SPEC, solid.SPEC)
-"""What flows and falls, what becomes of it, what exists, what is frozen."""
+"""Volumes and streams; coats and reactions; objects that exist; solids."""

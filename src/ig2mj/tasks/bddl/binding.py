@@ -39,7 +39,7 @@ PLACES = ("on_top", "inside", "next_to", "under", "in_contact_with")
 
 
 class BindingError(Ig2mjError):
-    """A home lacks what an activity needs; `reasons` are in words, one each."""
+    """A home lacks what an activity needs. `reasons`: a sentence for each thing that is missing."""
 
     def __init__(self, activity: str, home: str, reasons: Sequence[str]):
         self.activity, self.home, self.reasons = activity, home, tuple(reasons)

@@ -53,7 +53,7 @@ class Coverage:
 
     @property
     def why_not(self) -> str:
-        """What stands in the way, in words; "" where nothing is known to."""
+        """Why the definition is not sampled, in words; "" where no reason is known."""
         if self.lacks:
             return f"no state for {', '.join(self.lacks)}"
         if self.missing:
@@ -112,7 +112,7 @@ def sample_definitions(
 ) -> dict[str, str]:
     """Samples start states of definitions, and writes down how many were found: `<name>.json` for each.
 
-    What is there already goes on: so many seeds more as are missing.
+    Results that are there already are continued with the missing seeds.
 
     Args:
       homes: names of shipped homes. seconds: wall time for each seed. seeds: with how many of `SEEDS` seeds.

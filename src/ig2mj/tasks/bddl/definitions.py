@@ -1,4 +1,4 @@
-"""The activities that are known, and reading one: of BEHAVIOR-100, of BEHAVIOR-1K once fetched, or from any file."""
+"""Names and definitions of activities: of BEHAVIOR-100, of BEHAVIOR-1K once fetched, or of any file."""
 
 from __future__ import annotations
 

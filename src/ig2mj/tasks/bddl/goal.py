@@ -1,4 +1,4 @@
-"""A bound activity as our expressions, compiled against the scene: is it done, how far, what is missing."""
+"""The conditions of a bound activity as expressions over the scene, compiled: truth, progress, explanation."""
 
 from __future__ import annotations
 

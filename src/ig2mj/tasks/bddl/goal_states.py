@@ -47,7 +47,7 @@ ATTEMPTS = 12
 """Attempts at a goal state before it is given up."""
 
 ATTEMPT_BUDGET = 400
-"""Units of work (see `ig2mj.sampling.placement.Budget`) of one attempt."""
+"""Units of work (see `ig2mj.sampling.budget.Budget`) of one attempt."""
 
 STREAM = 1
 """Of random numbers, next to that of starts."""
@@ -138,7 +138,7 @@ def _sampler(scene: str, objects: tuple[str, ...], activity: str, behavior1k: bo
 
 @dataclasses.dataclass(frozen=True)
 class GoalState:
-    """What came of one start.
+    """Result of the search for a goal state from one start.
 
     Attributes:
       row: the goal state; None: not found. rejected: why candidates were turned down. attempts: how many were made.

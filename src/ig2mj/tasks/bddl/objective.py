@@ -57,7 +57,7 @@ class BddlObjective:
         return GoalProgress(jnp.asarray(status.fraction, jnp.float32))
 
     def rewards(self, before: GoalProgress, now: GoalProgress) -> dict[str, Float[Array, "W"]]:
-        """iGibson's: how much the share grew."""
+        """iGibson's reward: the increase of the share that holds."""
         return {"goal": now.share - before.share}
 
     def ended(self, now: GoalProgress, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:

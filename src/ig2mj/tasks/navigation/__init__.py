@@ -1,4 +1,4 @@
-"""Tasks of moving about: navigation to a point, among loose objects and other robots, reaching, closing furniture."""
+"""Navigation tasks: going to a point, among loose objects and other robots; reaching; closing furniture."""
 
 from ig2mj.process.public_names import offer_modules
 

@@ -1,4 +1,4 @@
-"""What other robots of a navigation task do: random actions, each held for a while."""
+"""Actions of the other robots of a navigation task: random ones, each repeated for `REPEAT` steps."""
 
 from __future__ import annotations
 

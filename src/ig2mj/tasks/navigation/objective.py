@@ -1,9 +1,9 @@
 """Measures, rewards, ends and observations of navigation tasks (iGibson's tasks).
 
-The potential is how far there still is to go: along the floor or in a straight line (m), or how far furniture stands
-open; the reward of a step is how much it fell, and `success_reward` where the goal is reached, and `collision_reward`
-where the robot touches something that is not the ground. Where the potential is not defined, off the map of the free
-floor, it keeps its last value.
+The potential is the remaining distance, along the floor or in a straight line (m), or how far furniture stands open.
+The reward of a step is the decrease of the potential, plus `success_reward` where the goal is reached, plus
+`collision_reward` where the robot touches something that is not the ground. Where the potential is not defined, off the
+map of the free floor, it keeps its last value.
 
 Axes: W worlds, P rows of the pool.
 """
@@ -36,7 +36,7 @@ BESIDE = 0.003
 
 @struct.dataclass
 class NavigationMeasures:
-    """Of every world.
+    """Measures of every world.
 
     Attributes:
       row: of the pool, with which the episode began. potential: see the module's text. ahead: the next point of the

@@ -1,4 +1,4 @@
-"""`NavigationTask`: where a robot is to go, or to reach, or what it is to close, as data.
+"""`NavigationTask`: a point to drive to or to reach, or furniture to close, as data.
 
 The rules and their figures are iGibson's.
 """
