@@ -1,4 +1,4 @@
-"""The two conversions as commands and programs call them: out of the cache where nothing has changed, else done.
+"""Conversions of scenes and objects with a cache of outputs: unchanged inputs give the cached result.
 
 What does the work (`convert_scene`, `convert_object`) is imported only when there is work: that alone takes seconds.
 """

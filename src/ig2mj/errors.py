@@ -46,7 +46,7 @@ class ManifestError(InputError):
 
 
 class PolicyServerError(Ig2mjError):
-    """A policy server cannot be reached, takes too long, or answers with what is no action."""
+    """A policy server cannot be reached, takes too long, or answers with something that is not an action."""
 
 
 class PolicyMismatch(InputError):
@@ -54,7 +54,7 @@ class PolicyMismatch(InputError):
 
 
 def without_lines(message: object) -> str:
-    """A compiler's message without line numbers, for a text that ig2mj generated: the user has no such lines."""
+    """A compiler's message without line numbers, for a text that ig2mj generated and the user does not have."""
     return re.sub(r",? line -?\d+", "", " ".join(str(message).split()))
 
 

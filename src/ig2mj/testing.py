@@ -1,4 +1,4 @@
-"""`api_test`: what every environment promises, checked by random play.
+"""`api_test`: the contract of every environment, checked by random play.
 
     ig2mj.testing.api_test(ig2mj.make("CookingMeat", worlds=3))
 
@@ -57,14 +57,14 @@ def api_test(
     - nothing is compiled again at the second reset and the second step; closing twice is harmless.
 
     Args:
-      seed: of resets and actions. steps: of each piece of random play.
+      seed: of resets and actions. steps: of each part of the random play.
       other: the same environment with another number of worlds. It is not closed.
       within: by which numbers may differ, absolute and relative, when the same steps are taken again. On a GPU sums are
-        made in any order, so that a step does not come out the same to the bit, and a ray that passed an edge by a hair
+        made in any order, so that a step does not come out the same to the bit, and a ray that passed an edge narrowly
         may hit it. So of what a camera or a laser reads in a world, in each step, one ray in a hundred (one where there
         are fewer) may differ by any amount. Everything else, and all of it where `within` is 0, may not.
       astray: share of worlds in which everything may differ then. Where contacts come and go, as under a robot that
-        rears up as it drives off, a few steps make centimetres of a rounding.
+        tips as it starts to drive, rounding errors grow to centimetres within a few steps.
     """
     assert env.num_worlds >= 2, "api_test needs an environment with at least two worlds"
     like = Likeness(within, astray)

@@ -1,11 +1,11 @@
 """`hold`: one writer for each output; a second one is refused, with the name of the first.
 
-Two things keep an output: a lock of the operating system, which ends with its process however that ends, and a sign of
-life in the same file (`ig2mj.files.heartbeat`). Processes of one machine, also in several containers, see each other's
-locks. Machines that share a network disk do where it has locks (NFS 4 has; others may say that they have and keep them
-to one machine), so that a lock alone is not believed there: a sign of life that is younger than two minutes holds the
-output, too. Who was killed on another machine therefore keeps an output for up to two minutes. On a disk without any
-locks two that begin in the same second can both begin.
+An output is held by a lock of the operating system, which ends with its process, and by a heartbeat in the same file
+(`ig2mj.files.heartbeat`). Processes of one machine, also in several containers, see each other's locks. Machines that
+share a network disk see them only if its file system has locks (NFS 4 does; others may accept locks and keep them
+local). There a heartbeat younger than two minutes holds the output as well. The output of a process that was killed on
+another machine is therefore held for up to two minutes. On a disk without locks, two processes that begin in the same
+second can both begin.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ class Hold:
         keep_touching(self)
 
     def touch(self) -> None:
-        """One beat."""
+        """Writes a heartbeat."""
         if not self._opened.closed:
             os.utime(self._opened.fileno())
 
     def close(self) -> None:
-        """The next one can have it at once; may be called twice."""
+        """Releases the output; may be called twice."""
         stop_touching(self)
         if not self._opened.closed:
             self._opened.truncate(0)

@@ -1,9 +1,8 @@
-"""`Team`: the processes of one training run, on one host or on several, and what they say to each other.
+"""`Team`: the processes of one training run, on one host or on several, and the messages between them.
 
-Process 0 listens at the coordinator's address; the others connect, and all compare versions before JAX learns of one
-another. The connections stay open: over them go a beat every few seconds, barriers, and the news that a process has
-died, which ends all the others with one line that names it. JAX has a watch of its own, which takes minutes, and ends
-processes without a word that a user could read.
+Process 0 listens at the coordinator's address. The others connect, and all compare versions before JAX is initialized.
+The connections stay open for heartbeats, for barriers, and for the message that a process has died, which ends all
+others with one line that names it. JAX's own watchdog takes minutes and ends processes without a readable message.
 
 Messages are lines of JSON. What the processes compute goes over JAX's own network, never over this one.
 """
@@ -27,10 +26,10 @@ from ig2mj.cluster.versions import versions
 from ig2mj.errors import ClusterError, Ig2mjError
 
 BEAT = 3.0
-"""Seconds between two beats of a process."""
+"""Seconds between two heartbeats of a process."""
 
 SILENCE = 40.0
-"""Seconds without a beat after which a process counts as dead; a closed connection counts at once."""
+"""Seconds without a heartbeat after which a process counts as dead; a closed connection counts at once."""
 
 GRACE = 5.0
 """Seconds that a process with an error of its own waits to hear whether another one's death is the reason."""
@@ -39,7 +38,7 @@ PATIENCE = 300.0
 """Seconds that processes wait for one another at the start."""
 
 THE_END = "the end"
-"""The last barrier: who has come to it may leave."""
+"""The last barrier: a process that has reached it may end."""
 
 
 class Team:
@@ -63,13 +62,13 @@ class Team:
 
     @classmethod
     def join(cls, place: ProcessTopology | None, patience: float = PATIENCE) -> Team:
-        """Waits for all processes, and tells JAX of them; before JAX is first used.
+        """Waits for all processes, and initializes `jax.distributed`; to be called before JAX is first used.
 
         Args:
-          place: which process this is (`place.find_topology`); None: there is no other.
+          place: topology of this process (`process_topology.find_topology`); None: there is no other process.
 
         Raises:
-          ClusterError: one has not come, cannot be reached, or has other versions.
+          ClusterError: a process is missing, cannot be reached, or has other versions.
         """
         if place is None or place.count == 1:
             return cls()
@@ -121,7 +120,7 @@ class Team:
     def turns(self) -> Iterator[None]:
         """Process 0 does what is inside first; the others wait, and find what it left in caches.
 
-        All processes must come here, and as often.
+        All processes must call this equally often.
         """
         name, self._turn = f"turn {self._turn}", self._turn + 1
         if not self.first:

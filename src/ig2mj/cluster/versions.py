@@ -15,7 +15,7 @@ PACKAGES = ("jax", "jaxlib", "mujoco", "warp-lang", "numpy")
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """Versions by name; of ig2mj also a mark of its source files, since two checkouts may bear one number."""
+    """Versions by name; of ig2mj also a hash of its source files, since two checkouts may have the same version."""
     found = {"Python": ".".join(platform.python_version_tuple()[:2]), "ig2mj": f"{own_version()} ({_sources()})"}
     return found | {name: _version(name) for name in PACKAGES}
 

@@ -64,7 +64,7 @@ def whole_number(name: str, value: Any, least: int = 1) -> int:
 
 
 def check_arguments(boxes: str, num_worlds: int, substeps: int, timestep: float) -> None:
-    """What every engine asks of its arguments. Raises EngineError."""
+    """Checks the arguments that all engines have. Raises EngineError."""
     if boxes not in BOX_RULES:
         raise EngineError(f"there is no box rule '{boxes}' (rules: {', '.join(BOX_RULES)})")
     whole_number("num_worlds", num_worlds)
@@ -257,7 +257,7 @@ class Engine(Protocol):
         Args:
           physics: as returned by the last call.
           ctrl: controls held during the step; None keeps those of the step before. Those beyond 1e6 are clipped, NaNs
-            keep the value of before; `Health.wrong_controls` tells of both.
+            keep the value of before; `Health.wrong_controls` reports both.
 
         Returns:
           The physics after the step and its view: poses, contacts and boxes of the same instant, forces of the steps

@@ -80,7 +80,8 @@ class _FieldsOf:
 
 
 def counted(thing: Any, **counts: int | None) -> str:
-    """A short `repr`: the class and how many of what it has, e.g. `Batch(3 worlds)`. None is left out."""
+    """A short `repr`: the class and counts of its contents, e.g. `Batch(3 worlds)`. Counts that are None are left
+    out."""
     facts = (f"{n} {what if n != 1 else what.rstrip('s')}" for what, n in counts.items() if n is not None)
     return f"{type(thing).__name__}({', '.join(facts)})"
 
@@ -227,8 +228,8 @@ def fields_of(view: PhysicsView | AgentView) -> Mapping[str, Any]:
 
 
 def but_agents(view: PhysicsView) -> object | None:
-    """What stands for all of a view but its agents and their bodies: the same object in views between which nothing
-    else changed. None where the engine does not say."""
+    """An object that identifies all of a view but its agents and their bodies: the same in views between which nothing
+    else changed. None where the engine does not provide it."""
     return getattr(view._mapping, "but_agents", None)
 
 
@@ -270,7 +271,7 @@ def with_eyes_later(view: PhysicsView, eyes: Callable[[], tuple[Array, Array]]) 
 
 
 OF_CONSTRAINTS = ("touching", "link_force", "awake", "held", "agent.finger_force", "agent.touching")
-"""What of a view changes with constraints and ignored contacts where nothing moves."""
+"""Fields of a view that change with constraints and ignored contacts while nothing moves."""
 
 
 def blank_view(sizes: Mapping[str, int]) -> PhysicsView:
@@ -279,7 +280,7 @@ def blank_view(sizes: Mapping[str, int]) -> PhysicsView:
 
 
 def faults(view: PhysicsView, sizes: Mapping[str, int]) -> list[str]:
-    """What is wrong with the shapes and dtypes of a view; nothing, for a sound one."""
+    """Errors in shapes and dtypes of a view, a sentence each; empty for a correct view."""
     found = []
     for name, field in SCHEMA.items():
         array = read_field(view, name)

@@ -115,8 +115,7 @@ def library() -> dict[str, dict[str, LibraryModel]]:
 
 @functools.cache
 def split_models() -> dict[str, list[str]]:
-    """Models of the library that ships which are there for splits alone, by category: activities are not bound to them
-    by their size."""
+    """Models of the library that ships which only splits use, by category; activities are not bound to them."""
     file = paths.SHIPPED_HOMES / FOLDER / VARIANTS_FILE
     return msgspec.json.decode(file.read_bytes(), type=dict[str, list[str]]) if file.is_file() else {}
 

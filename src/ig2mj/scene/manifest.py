@@ -125,6 +125,8 @@ class ObjectEntry(msgspec.Struct, omit_defaults=True):
 
 
 class RoomEntry(msgspec.Struct):
+    """A room instance: its type, such as "kitchen", and its floor, 0 the lowest."""
+
     type: str
     floor: int = 0
 

@@ -69,7 +69,7 @@ def add_library(folder: str | os.PathLike) -> tuple[pathlib.Path, list[pathlib.P
 
 
 def remove_library(folder: str | os.PathLike) -> pathlib.Path:
-    """Forgets a library; its files stay. Raises InputError: it is not kept."""
+    """Removes a library from the list; its files stay. Raises InputError: it is not kept."""
     path = pathlib.Path(folder).expanduser().resolve()
     kept = _kept()
     left = [name for name in kept.libraries if name not in (str(path), str(folder))]

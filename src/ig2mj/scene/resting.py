@@ -1,7 +1,7 @@
 """Where added objects come to rest on their slab, so that they are at rest when the scene is loaded.
 
 A model stands on its lowest point, which may be too small to bear it: an apple rolls off it onto its side. A small
-model of the slab and what stands there, without anything to be seen, is stepped until it sleeps.
+model of the slab and what stands there, without visual geoms, is stepped until it sleeps.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ KNOWN_DIGESTS = pathlib.Path(__file__).with_name("known_digests.json")
 
 @runtime_checkable
 class Attachable(Protocol):
-    """A robot, as far as a scene knows it (see `ig2mj.agents.base`)."""
+    """The part of a robot's interface that scenes use (see `ig2mj.agents.base`)."""
 
     def attach(self, spec: mujoco.MjSpec) -> AgentEntry:
         """Adds its bodies to a scene that is not compiled yet, at its start, and says what it added."""

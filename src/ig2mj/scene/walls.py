@@ -1,8 +1,8 @@
-"""Outer walls as physics has them: a metre deep, to the outside, and giving way for longer than inner ones.
+"""Collision geometry of outer walls: a metre deep, to the outside, with softer contacts than inner walls.
 
-What a hand presses into a thin wall, or what flies into it at an angle, is pushed out on the nearest side, and leaves
-the house. A deep wall gives it back. Contacts of a deep solid must not be as stiff as others', or they throw what is
-thin (`scene/floors.py`). Windows are closed on the outside by invisible panes. `docs/notes/lost.md`.
+An object that a hand presses into a thin wall, or that hits it at an angle, is pushed out on the nearest side, and
+leaves the house. A deep wall pushes it back inside. Contacts of a deep solid must be softer than others', or they throw
+thin objects (`scene/floors.py`). Windows are closed on the outside by invisible panes. `docs/notes/lost.md`.
 """
 
 from __future__ import annotations

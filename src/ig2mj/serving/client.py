@@ -1,4 +1,4 @@
-"""`connect`: a policy server as something that answers observations of many worlds with chunks of actions.
+"""`connect`: a client of policy servers, which answer observations of many worlds with chunks of actions.
 
     server = connect("ws://localhost:8000")
     chunks = server.infer([Question(world, obs, instruction, begins), ...])      # [T, n] of each

@@ -1,4 +1,4 @@
-"""`serve`: one of our policies behind a websocket, by openpi's protocol.
+"""`serve`: a policy of ig2mj behind a websocket, by openpi's protocol.
 
 The metadata names the task, robot and observations, and says that batches are answered (`"batch": true`). What a policy
 remembers belongs to a connection and to the number `world` of an observation, else its place in the batch. An episode

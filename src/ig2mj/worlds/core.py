@@ -60,7 +60,7 @@ Policy = Callable[[Batch, Any], tuple[Float[Array, "W n"] | None, Any]]
 
 
 class Advanced(NamedTuple):
-    """What a control step leaves: physics, its view, states, what the goal says, and what hands hold."""
+    """Result of a control step: physics, its view, states, status of the goal, and what hands hold."""
 
     physics: Physics
     view: PhysicsView
@@ -75,7 +75,7 @@ class Core:
 
     Attributes:
       engine: physics. rules: states and goal. controllers: of the scene's robots. controls: from actions to MuJoCo's
-        controls. hands: what they hold. hand_resets: hands that are asked back. cameras: of the robots, in views.
+        controls. hands: what they hold. hand_resets: hands that are reset. cameras: of the robots, in views.
       grasping: how hands hold. starts: what episodes start from. advance: see `advance_fn`.
     """
 
@@ -138,7 +138,7 @@ class Core:
             [W, nu]. None: the previous controls are kept.
 
         Returns:
-          The batch after the step, and what the goal says of it: of the states after it, and of the view before slicing
+          The batch after the step, and the status of the goal: of the states after it, and of the view before slicing
           moved anything.
         """
         return self._step(batch, action)

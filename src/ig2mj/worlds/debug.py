@@ -1,4 +1,4 @@
-"""Debug mode: every step is checked on the host; the first world that goes wrong is dumped and raises."""
+"""Debug mode: every step is checked on the host; the first flagged world is dumped, and raises an error."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ class Face:
         return self.core.start(seed)
 
     def step(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
-        """One control step of every world, and what the goal says of it; see `Core.step`. Consumes the batch."""
+        """One control step of every world, and the status of the goal; see `Core.step`. Consumes the batch."""
         return self.core.step(batch, action)
 
     def reset(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:

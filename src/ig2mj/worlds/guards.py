@@ -1,7 +1,7 @@
-"""Guards: worlds that went wrong are flagged, counted, and put right at the next reset.
+"""Guards: worlds with errors are flagged, counted, and replaced at the next reset.
 
-A flagged world goes on being stepped with the others; whatever it says is not to be believed, and `reset` replaces it.
-On the native engine one that is not finite stays as it was in the step before.
+A flagged world is stepped with the others, but its results are meaningless. On the native engine a world that is no
+longer finite stays as it was in the step before.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ BELOW_FLOOR = 0.5
 
 
 class Flag(enum.IntFlag):
-    """What can be wrong with a world."""
+    """Errors of a world."""
 
     OVERFLOW = 1
     NOT_FINITE = 2
@@ -82,8 +82,8 @@ def counted(
 
 
 def counter(engine: Engine, floor: Callable[[], Float[np.ndarray, "O"]], seconds: float) -> Callable[..., tuple]:
-    """`counted` of the first six arguments, compiled. In nearly every step NumPy finds that nothing is wrong, in a
-    tenth of a program's time."""
+    """`counted` of the first six arguments, compiled. In most steps NumPy finds no error, in a tenth of
+    the time of the compiled program."""
 
     def count_fn(step: Array, time: Array, flags: Array, troubles: Array, health: Health, com: Array) -> tuple:
         return counted(step, time, flags, troubles, health, com, floor=floor(), seconds=seconds)

@@ -23,10 +23,10 @@ from ig2mj.engine.view import Array, PhysicsView
 
 @runtime_checkable
 class WithHandResets(Protocol):
-    """A controller whose hands can be asked back.
+    """A controller whose hands can be reset.
 
     Attributes:
-      reset_numbers: [K] numbers of the action that ask a hand back, above 0.
+      reset_numbers: [K] indices into the action of each hand's reset, which acts above 0.
       hand_qposadr: [K, 3] addresses of the coordinates that are the hand's position in the world.
     """
 

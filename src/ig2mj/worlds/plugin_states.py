@@ -1,4 +1,4 @@
-"""States of plug-ins in files: what a file says of them, and what happens where file and scene have different ones.
+"""States of plug-ins in files, also where file and scene have different ones.
 
 A file names the fields of plug-ins' states, and where each comes from. Fields that the file lacks start as in a new
 world. Fields that the scene lacks cannot be used: the plug-in is not there.

@@ -151,7 +151,7 @@ class SensorNoise(_Axis):
 
     Attributes:
       rgb: standard deviation of each colour, of the whole range. depth: of each depth, as a share of it.
-      proprioception: of each number of what the robot feels.
+      proprioception: of each number of proprioception.
     """
 
     rgb: float = 0.04

@@ -68,7 +68,7 @@ def start_recording(engine: Engine, batch: Batch, length: int = LENGTH) -> Recen
 
 @entry_point
 def record(engine: Engine, recording: RecentSteps, batch: Batch) -> RecentSteps:
-    """Adds the present state, over the oldest one when full. Pure, and uses up the recording it is given."""
+    """Adds the present state, over the oldest one when full. Pure; consumes the recording that it is given."""
     rings = _put(recording.rings, recording.written % recording.length, jax.tree.leaves(_now(engine, batch)))
     return RecentSteps(rings, recording.written + 1, recording.kind)
 

@@ -6,7 +6,7 @@ to its global number, so it does not matter on which device it lands.
 
 Why not one program for all devices (`shard_map`): XLA crashes while it compiles such a program for two GPUs when it
 holds MJX-Warp's calls (JAX 0.11.2; one device, and two CPU devices, are fine). One program per device needs nothing of
-the compiler, and as no world talks to another it does the same work.
+the compiler, and since worlds do not exchange anything it does the same work.
 """
 
 from __future__ import annotations
@@ -87,10 +87,10 @@ class ShardedWorlds:
         )
 
     def step(self, batch: Shards, action: Float[Array, "W n"] | None = None) -> tuple[Shards, GoalStatus]:
-        """One control step of every world, and what the goal says, over all worlds of this process.
+        """One control step, and the status of the goal, of all worlds of this process.
 
         Args:
-          action: of all worlds of this process (see `Core.step`), or None to keep what was asked last.
+          action: of all worlds of this process (see `Core.step`), or None to keep the last controls.
         """
         local = [None] * len(self.devices) if action is None else self._split(action)
         done = self._each(lambda k: self.local.step(batch.parts[k], local[k]))

@@ -34,7 +34,7 @@ from ig2mj.worlds.robot_starts import RobotStarts
 
 @struct.dataclass
 class Choices:
-    """What is chosen from tables of a scene, of every world; None: the axis is off.
+    """What each world takes from tables of a scene; None: the axis is off.
 
     Attributes:
       object_poses: row of the start states that differ in poses.

@@ -35,7 +35,7 @@ class JaxEngine(MjxEngine):
     unrolled = False  # a step's program is large: compile it once
 
     def prepare_devices(self, devices: Sequence[Any]) -> None:
-        """Nothing: a program allocates its own memory."""
+        """Does nothing: a program allocates its own memory."""
 
     def pending_reset_program(self) -> None:
         """See `Engine.pending_reset_program`."""

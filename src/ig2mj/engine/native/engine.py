@@ -1,4 +1,4 @@
-"""The native engine: C MuJoCo with sleeping, one world or many on a thread pool. No physics of JAX in it.
+"""The native engine: C MuJoCo with sleeping, one world or many on a thread pool.
 
 Each world has its own MjData and is stepped by one thread from start to end, so that results are the same, bit for
 bit, for any number of threads and of worlds. (`mujoco.batch.Batch` steps as fast, but gives neither contacts nor a way
@@ -167,8 +167,8 @@ class NativeEngine(HostExecution, SceneEngine):
     def step(
         self, physics: NativePhysics, ctrl: Float[Array, "W nu"] | None = None
     ) -> tuple[NativePhysics, PhysicsView]:
-        """One control step of every world; see `Engine.step`. Raises LostWorldError where a world is lost, after the
-        others were stepped: who wants them goes on with the same physics and its view."""
+        """One control step of every world; see `Engine.step`. Raises LostWorldError where a world is no longer finite,
+        after the others were stepped, which continue with the same physics and its view."""
         live: Any = physics._live
         if live.generation != physics.generation or live.statics is not self._statics:  # inline: rest takes under 2 us
             live = self._live(physics)
@@ -202,7 +202,7 @@ class NativeEngine(HostExecution, SceneEngine):
         return np.array([world.data.time for world in self._live(physics).worlds])
 
     def write(self, physics: NativePhysics, write: Write) -> NativePhysics:
-        """Applies a change in place, but to worlds that are lost; see `Engine.write`."""
+        """Applies a change in place, except to worlds that are no longer finite; see `Engine.write`."""
         live = self._live(physics)
         check_written(write.model_fields, self._statics.own_fields, self._slots[0].model, self.num_worlds)
         values = {field.name: getattr(write, field.name) for field in dataclasses.fields(Write)}
@@ -226,7 +226,7 @@ class NativeEngine(HostExecution, SceneEngine):
         return np.where(eq_data == compiled.astype(np.float32), compiled, eq_data)
 
     def prepare_devices(self, devices: Sequence[Any]) -> None:
-        """Nothing: worlds are on the processor."""
+        """Does nothing: worlds are on the processor."""
 
     def health(self, physics: NativePhysics) -> Health:
         """What went wrong in each world; see `ig2mj.engine.health`. C MuJoCo's buffers grow: nothing overflows."""
