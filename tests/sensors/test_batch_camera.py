@@ -328,7 +328,7 @@ def test_cameras_ride_on_their_bodies(shoot, model, engine):
     states = initial_states(model, 2)
     snapshot = jax.tree.map(np.array, engine.snapshot(engine.reset()))
     address = engine.scene.model.joint("hand_z").qposadr[0]
-    qpos = snapshot.qpos
+    qpos = np.array(snapshot.qpos)
     qpos[1, address] = 0.15
     snapshot = snapshot.with_whole(qpos=qpos)
     moved = jax.jit(engine.load)(engine.reset(), jax.tree.map(jnp.asarray, snapshot))

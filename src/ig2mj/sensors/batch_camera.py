@@ -148,6 +148,9 @@ class BatchCamera:
             background_color=BACKGROUND,
             use_shadows=shadows,
             enable_backface_culling=cull_backfaces,
+            enable_specular=bool(max(host.light_specular.max(initial=0.0), *host.vis.headlight.specular) > 0.0),
+            enable_emission=bool(host.mat_emission.max(initial=0.0) > 0.0),
+            enable_per_light_ambient=bool(host.light_ambient.max(initial=0.0) > 0.0),
         )
         self._served = [str(wp.get_device())]
         self._make_context()
@@ -199,7 +202,7 @@ class BatchCamera:
         parts = rigid_parts(host, self.engine.scene.model, groups, self._covered)
         if not parts:
             return None
-        tables = tables_of(host, parts)
+        tables = tables_of(host, parts, self.engine.scene.rooms)
         host.geom_group[tables.absorbed] = HIDDEN
         host.geom_group[alpha(host) == 0] = HIDDEN
         if len(tables.absorbed) and not np.isin(host.geom_group, list(groups)).any():

@@ -4,7 +4,7 @@ MJX-Warp's ray caster has a tree of boxes for each world, with a box for each ge
 mesh asset. A ray that looks across a room enters the boxes of walls, floor, ceiling and most furniture, and looks for a
 triangle in each, in no particular order. Merged meshes have one tree for all of them, which all worlds share.
 
-Axes: V vertices, F triangles, G geoms.
+Axes: V vertices, F triangles, G geoms, N boxes.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.looks.visual import COSTUMES, OUTSIDE
+from ig2mj.scene.rooms import Rooms
+from ig2mj.sensors.indoors import indoor_boxes
 
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 
@@ -36,7 +38,8 @@ class RigidPart:
     """Meshes that move as one.
 
     Attributes:
-      geom: in whose frame the vertices are; -1 for what never moves, whose vertices are in the world frame.
+      geom: in whose frame the vertices are; -1 for what never moves and for the garden, whose vertices are in the world
+        frame.
       geoms: whose triangles these are, one geom's after the other's.
       vertices: metres. faces: vertices of triangles. face_geom: whose each is.
     """
@@ -54,7 +57,7 @@ def rigid_parts(
     groups: Sequence[int],
     covered: Mapping[int, Bool[np.ndarray, "F"]] = MappingProxyType({}),
 ) -> list[RigidPart]:
-    """The parts of a render model, those that never move first; the garden is one of the others.
+    """The parts of a render model: what never moves, what does, the garden; each where there is one, in this order.
 
     Meshes that are invisible (alpha 0) in the compiled scene are in no part.
 
@@ -70,13 +73,13 @@ def rigid_parts(
         if geom >= scene.ngeom and host.body(host.geom_bodyid[geom]).name == COSTUMES:
             continue  # moves by itself
         if geom >= scene.ngeom and host.geom(geom).name.startswith(f"ig2mj/{OUTSIDE}"):
-            by_body.setdefault(host.nbody, []).append(int(geom))  # few rays leave the house: not in the tree of all
+            by_body.setdefault(host.nbody, []).append(int(geom))  # few rays leave the house: a tree of its own
             continue
         body = int(scene.geom_bodyid[geom]) if geom < scene.ngeom else 0  # what else looks add stands still
         welded = int(scene.body_weldid[body])
         mocap = int(scene.body_mocapid[scene.body_rootid[body]]) >= 0
         by_body.setdefault(welded if welded or not mocap else body, []).append(int(geom))
-    return [_part(host, data, geoms, covered, moves=body > 0) for body, geoms in sorted(by_body.items())]
+    return [_part(host, data, geoms, covered, 0 < body < host.nbody) for body, geoms in sorted(by_body.items())]
 
 
 def alpha(model: mujoco.MjModel) -> Float[np.ndarray, "G"]:
@@ -131,6 +134,7 @@ class Tables:
       data_id: of geoms: the merged mesh of those that stand for a part, else as in the model.
       face_geom: geoms of the triangles of all parts. part_face: each part's first triangle among them.
       geom_face: each geom's first triangle in its part. geom_mesh: its own mesh.
+      indoors: low and high corners of boxes that nothing of the garden is in, m.
     """
 
     parts: tuple[RigidPart, ...]
@@ -139,6 +143,7 @@ class Tables:
     part_face: Int[np.ndarray, "P"]
     geom_face: Int[np.ndarray, "G"]
     geom_mesh: Int[np.ndarray, "G"]
+    indoors: Float[np.ndarray, "N 2 3"]
 
     @property
     def still(self) -> bool:
@@ -146,13 +151,18 @@ class Tables:
         return bool(self.parts) and self.parts[0].geom < 0
 
     @property
+    def garden(self) -> bool:
+        """The last part, and not the first, is what is around the home."""
+        return len(self.parts) > 1 and self.parts[-1].geom < 0
+
+    @property
     def absorbed(self) -> Int[np.ndarray, "n"]:
         """Geoms that need no box of their own."""
         return np.array([g for part in self.parts for g in part.geoms if g != part.geom], int)
 
 
-def tables_of(host: mujoco.MjModel, parts: Sequence[RigidPart]) -> Tables:
-    """Tables of these parts of a render model."""
+def tables_of(host: mujoco.MjModel, parts: Sequence[RigidPart], rooms: Rooms | None = None) -> Tables:
+    """Tables of these parts of a render model; rooms: of the home."""
     data_id, first = np.array(host.geom_dataid, np.int32), np.zeros(host.ngeom, np.int32)
     sizes = [len(part.faces) for part in parts]
     for number, part in enumerate(parts):
@@ -160,11 +170,16 @@ def tables_of(host: mujoco.MjModel, parts: Sequence[RigidPart]) -> Tables:
             data_id[part.geom] = host.nmesh + number
         for geom in part.geoms:
             first[geom] = np.argmax(part.face_geom == geom)
-    return Tables(
+    tables = Tables(
         parts=tuple(parts),
         data_id=data_id,
         face_geom=np.concatenate([part.face_geom for part in parts]) if parts else np.zeros(0, np.int32),
         part_face=(np.cumsum(sizes) - sizes).astype(np.int32),
         geom_face=first,
         geom_mesh=np.array(host.geom_dataid, np.int32),
+        indoors=np.zeros((0, 2, 3)),
     )
+    if rooms is None or not (tables.still and tables.garden):
+        return tables
+    around = parts[-1].vertices[parts[-1].faces]
+    return dataclasses.replace(tables, indoors=indoor_boxes(rooms, parts[0].vertices, around))

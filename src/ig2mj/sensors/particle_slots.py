@@ -5,13 +5,14 @@ Axes: W worlds, N particles of all kinds, S slots.
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import quat_to_matrix
+from ig2mj.geometry.poses import quat_rotate, quat_to_matrix
 from ig2mj.sensors.render_model import NOWHERE
 from ig2mj.sensors.tints import DUST_COLOUR, STAIN_COLOUR, WATER_COLOUR
 from ig2mj.states.definitions.water import DROP_RADIUS, NUM_DROPS
@@ -21,8 +22,6 @@ from ig2mj.states.particles import (
     NUM_PARTICLES,
     STAIN_THICKNESS,
     stain_sizes,
-    world_normals,
-    world_positions,
 )
 from ig2mj.states.world import ExtendedStates
 
@@ -76,38 +75,59 @@ def fill_slots(model: StateModel, states: ExtendedStates, view: PhysicsView, cou
         np.array([DUST, STAIN, WATER], np.int32),
         [dust_rows * NUM_PARTICLES, stain_rows * NUM_PARTICLES, sources * NUM_DROPS],
     )
-    upright = jnp.broadcast_to(jnp.array([0.0, 0.0, 1.0]), (worlds, sources * NUM_DROPS, 3))
+
+    blank = Slots(
+        pos=jnp.full((worlds, count, 3), jnp.array(NOWHERE, jnp.float32)),
+        rotation=jnp.full((worlds, count, 3, 3), jnp.eye(3)),
+        size=jnp.full((worlds, count, 3), 1e-4, jnp.float32),
+        colour=jnp.zeros((worlds, count, 3), jnp.float32),
+        owner=jnp.full((worlds, count), -1, jnp.int32),
+        kind=jnp.full((worlds, count), -1, jnp.int32),
+        body=jnp.zeros((worlds, count), jnp.int32),
+    )
+    if not len(kinds):
+        return blank
 
     def rows(dust: Array, stain: Array, water: Array, width: int) -> Array:
-        return jnp.concatenate([a.reshape(worlds, -1, width) for a in (dust, stain, water)], axis=1)
+        return jnp.concatenate([jnp.asarray(a).reshape(worlds, -1, width) for a in (dust, stain, water)], axis=1)
 
-    no_body = jnp.zeros((worlds, sources * NUM_DROPS), jnp.int32)
-    there = rows(states.dust.alive, states.stain.alive, states.water.active, 1)[..., 0]
-    pos = rows(world_positions(states.dust, view), world_positions(states.stain, view), states.water.pos, 3)
-    normal = rows(world_normals(states.dust, view), world_normals(states.stain, view), upright, 3)
-    slot = _slot_of(there, count)
-    world = jnp.arange(worlds)[:, None]
+    shown, at = _shown(rows(states.dust.alive, states.stain.alive, states.water.active, 1)[..., 0], count)
 
-    def put(blank: Array, values: Array) -> Array:
-        return jnp.broadcast_to(blank, (worlds, count, *blank.shape)).at[world, slot].set(values, mode="drop")
+    def of_slots(dust: Array, stain: Array, water: Array, width: int) -> Array:
+        return jnp.take_along_axis(rows(dust, stain, water, width), at[..., None], axis=1)
 
-    shape = (worlds, len(sizes))
-    quat = _turn_to(put(jnp.array([0.0, 0.0, 1.0]), normal))
-    return Slots(
-        pos=put(jnp.array(NOWHERE, jnp.float32), pos),
-        rotation=quat_to_matrix(quat),
-        size=put(jnp.full(3, 1e-4, jnp.float32), jnp.broadcast_to(sizes, (*shape, 3))),
-        colour=put(jnp.zeros(3, jnp.float32), jnp.broadcast_to(colours, (*shape, 3))),
-        owner=put(jnp.array(-1, jnp.int32), jnp.broadcast_to(owners, shape)),
-        kind=put(jnp.array(-1, jnp.int32), jnp.broadcast_to(kinds, shape)),
-        body=put(jnp.array(0, jnp.int32), rows(states.dust.body, states.stain.body, no_body, 1)[..., 0]),
+    drops = (worlds, sources * NUM_DROPS)
+    body = of_slots(states.dust.body, states.stain.body, jnp.zeros(drops, jnp.int32), 1)
+    turn, origin = (jnp.take_along_axis(jnp.asarray(a), body, axis=1) for a in (view.body_quat, view.body_pos))
+    pos = of_slots(states.dust.pos, states.stain.pos, states.water.pos, 3)
+    upright = jnp.broadcast_to(jnp.array([0.0, 0.0, 1.0]), (*drops, 3))
+    normal = of_slots(states.dust.normal, states.stain.normal, upright, 3)
+    falls = jnp.asarray(kinds)[at, None] == WATER  # in the world frame
+    found = Slots(
+        pos=jnp.where(falls, pos, origin + quat_rotate(turn, pos)),
+        rotation=quat_to_matrix(_turn_to(jnp.where(falls, normal, quat_rotate(turn, normal)))),
+        size=jnp.asarray(sizes)[at],
+        colour=jnp.asarray(colours)[at],
+        owner=jnp.asarray(owners)[at],
+        kind=jnp.asarray(kinds)[at],
+        body=body[..., 0],
     )
 
+    def where_shown(value: Array, none: Array) -> Array:
+        return jnp.where(shown.reshape(*shown.shape, *(1,) * (value.ndim - 2)), value, none)
 
-def _slot_of(there: Bool[Array, "W N"], count: int) -> Int[Array, "W N"]:
-    """The slot of each particle; `count`, which is out of range, for those that are not shown."""
+    return jax.tree.map(where_shown, found, blank)
+
+
+def _shown(there: Bool[Array, "W N"], count: int) -> tuple[Bool[Array, "W S"], Int[Array, "W S"]]:
+    """Which slots show a particle, and which: the first so many that are there."""
+    worlds, particles = there.shape
     rank = jnp.cumsum(there.astype(jnp.int32), axis=1) - 1
-    return jnp.where(there & (rank < count), rank, count)
+    slot = jnp.where(there & (rank < count), rank, count)
+    number = jnp.broadcast_to(jnp.arange(particles, dtype=jnp.int32), there.shape)
+    at = jnp.full((worlds, count), -1, jnp.int32)
+    at = at.at[jnp.arange(worlds)[:, None], slot].set(number, mode="drop")
+    return at >= 0, jnp.maximum(at, 0)
 
 
 def _turn_to(normal: Float[Array, "W S 3"]) -> Float[Array, "W S 4"]:

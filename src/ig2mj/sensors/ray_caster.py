@@ -1,10 +1,11 @@
 """Rays against merged meshes (`ig2mj.sensors.merged_meshes`), in MJX-Warp's ray caster.
 
 Only the function that finds what a ray hits is ours; the kernel around it is upstream's but for its light
-(`ig2mj.sensors.shading`). A ray is first tested against what never moves, in one tree that all worlds share, and then,
-up to that distance, against what moves: upstream tests all geoms in the order of one tree. Hits are the same up to
-rounding, but for surfaces in the same place: there upstream shows the geom with the larger number, and within a merged
-mesh either is shown.
+(`ig2mj.sensors.shading`). A ray is first tested against what never moves, in one tree that all worlds share, then, up
+to that distance, against what moves, and then against the garden, unless it begins and ends indoors
+(`ig2mj.sensors.indoors`): upstream tests all geoms in the order of one tree. Hits are the same up to rounding, but for
+surfaces in the same place: there upstream shows the geom with the larger number, and within a merged mesh either is
+shown.
 """
 
 # Warp's kernels only look like Python, so that type checkers must leave them alone:
@@ -48,7 +49,7 @@ def use_merged(
     assert host.nflex == 0, "flexes' arrays carry the tables"
 
     def make_cast_ray(geom_ray_types: tuple[int, ...], first_hit: bool = False) -> wp.Function:
-        return _cast_ray(geom_ray_types, first_hit, host.ngeom, host.nmesh, tables.still)
+        return _cast_ray(geom_ray_types, first_hit, host.ngeom, host.nmesh, tables)
 
     data = mujoco.MjData(host)
     mujoco.mj_forward(host, data)
@@ -81,12 +82,17 @@ def use_merged(
 
 
 @no_type_check
-def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, still: bool) -> wp.Function:
+def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, known: Tables) -> wp.Function:
     """The function for the kinds of geoms that have boxes. With `first_hit` any hit nearer than `max_dist` will do.
 
     Upstream's arguments are kept; two arrays of flexes, of which there are none, hold the tables of merged meshes.
     """
 
+    still, garden = known.still, known.garden
+    last = nmesh + len(known.parts) - 1
+    last_face = int(known.part_face[-1])
+    boxes = len(known.indoors)
+    corners = wp.types.vector(length=max(6 * boxes, 1), dtype=float)(*(known.indoors.ravel() if boxes else (0.0,)))
     primitives = any(kind in kinds for kind in (PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX))
 
     @wp.func
@@ -206,6 +212,31 @@ def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, s
                     bary_v = v
                     face = f
                     mesh_id = merged
+        if wp.static(garden):
+            indoors = bool(False)
+            if wp.static(boxes > 0):
+                end = origin + dist * direction
+                rooms = wp.static(corners)
+                for k in range(wp.static(boxes)):
+                    low = wp.vec3(rooms[6 * k], rooms[6 * k + 1], rooms[6 * k + 2])
+                    high = wp.vec3(rooms[6 * k + 3], rooms[6 * k + 4], rooms[6 * k + 5])
+                    both = wp.min(origin, end) - low
+                    far = high - wp.max(origin, end)
+                    if wp.min(both) > 0.0 and wp.min(far) > 0.0:
+                        indoors = True
+            if not indoors:
+                axes = wp.mat33(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+                d, n, u, v, f, merged = ray.ray_mesh_with_bvh(
+                    mesh_bvh_id, wp.static(last), wp.vec3(0.0, 0.0, 0.0), axes, origin, direction, dist, cull_backfaces
+                )
+                if d >= 0.0 and d < dist:
+                    dist = d
+                    normal = n
+                    geom_id = face_geom[wp.static(last_face) + f]
+                    bary_u = u
+                    bary_v = v
+                    face = f - tables[geom_id]
+                    mesh_id = tables[wp.static(ngeom) + geom_id]
         return geom_id, dist, normal, bary_u, bary_v, face, mesh_id
 
     return cast_ray

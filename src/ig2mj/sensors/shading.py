@@ -38,6 +38,13 @@ SHINE = (
 )
 """Parts of its lines, and what stands in their place: highlights are not limited by a texture."""
 
+_AT_CAMERA = '    if wp.static(rc_static["headlight_active"]):\n      cam_pos = ray_origin_world\n'
+
+_FALLS = 'max(*rc_static["headlight_diffuse"], *rc_static["headlight_specular"]) > 0.0'
+
+NO_HEADLIGHT = ((_AT_CAMERA, _AT_CAMERA.replace("])", f"] and {_FALLS})", 1)),)
+"""A light at the camera that is black by its own colours is not computed."""
+
 _HEAD = "light_diffuse[worldid % light_diffuse.shape[0], wp.static(M_NLIGHT - 1)]"
 
 LIGHTS_PER_WORLD = tuple(
@@ -74,7 +81,7 @@ def limit_light(
     """
     build = render._build_megakernel
     text = inspect.getsource(build)
-    for old, new in (*((line, line + more) for line, more in LIGHT), *SHINE, *changes):
+    for old, new in (*((line, line + more) for line, more in LIGHT), *SHINE, *NO_HEADLIGHT, *changes):
         assert text.count(old) == 1, f"MuJoCo Warp's kernel has changed: {old}"
         text = text.replace(old, new)
     own = defined(build.__name__, text, {**build.__globals__, "_make_cast_ray": make_cast_ray})
