@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from plain_rays import enters, rays_hit_pieces
 
 from ig2mj.geometry import poses, rays
 from ig2mj.geometry.hulls import signed_depth
-from ig2mj.geometry.rays import capsule_interval, cylinder_interval, enters, polyhedron_interval, sphere_interval
+from ig2mj.geometry.rays import capsule_interval, cylinder_interval, polyhedron_interval, sphere_interval
 from ig2mj.scene.tables import PieceKind
 
 SEEDS = st.integers(0, 2**31)
 NUM_RAYS = 12
-hit_pieces = jax.jit(rays.rays_hit_pieces, static_argnames="inflate")
+hit_pieces = jax.jit(rays_hit_pieces, static_argnames="inflate")
 X, Z = np.array([1.0, 0, 0], np.float32), np.array([0, 0, 1.0], np.float32)
 CUBE = np.concatenate([np.concatenate([np.eye(3), -np.eye(3)]), np.ones((6, 1))], axis=1).astype(np.float32)
 
@@ -166,7 +167,7 @@ def test_gradients_of_entries_are_finite_and_right(shapes):
     directions = (aims / np.linalg.norm(aims, axis=-1, keepdims=True)).astype(np.float32)
 
     def whole(origins, pos, quat):
-        t = rays.rays_hit_pieces(origins, directions, jnp.full(NUM_RAYS, 5.0), pos, quat, kind, size, planes)
+        t = rays_hit_pieces(origins, directions, jnp.full(NUM_RAYS, 5.0), pos, quat, kind, size, planes)
         return jnp.sum(jnp.where(jnp.isfinite(t), t, 0.0)), jnp.sum(jnp.isfinite(t), axis=-1)
 
     gradients, hits = jax.jit(jax.grad(whole, argnums=(0, 1, 2), has_aux=True))(origins, pos, quat)
@@ -180,7 +181,7 @@ def test_kinds_unknown_while_tracing_give_the_same(shapes):
     origins = np.random.default_rng(6).normal(size=(NUM_RAYS, 3)).astype(np.float32)
     lengths = np.full(NUM_RAYS, 3.0, np.float32)
     args = (origins, -origins, lengths, pos, quat)
-    static = jax.jit(lambda *a: rays.rays_hit_pieces(*a, shapes.kind, shapes.size, shapes.planes))(*args)
+    static = jax.jit(lambda *a: rays_hit_pieces(*a, shapes.kind, shapes.size, shapes.planes))(*args)
     traced = hit_pieces(*args, jnp.asarray(shapes.kind), shapes.size, shapes.planes)
     np.testing.assert_allclose(traced, static, rtol=1e-5)
     assert np.isfinite(static).any() and PieceKind.POLYHEDRON in shapes.kind

@@ -6,12 +6,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from plain_rays import rays_hit_pieces
 
-from ig2mj.geometry import poses, rays
+from ig2mj.geometry import poses
 from ig2mj.geometry.hulls import signed_depth
 from ig2mj.geometry.targets import RayTargets, fall_contact, lines_enter_targets
 
-hit_pieces = jax.jit(rays.rays_hit_pieces, static_argnames="inflate")
+hit_pieces = jax.jit(rays_hit_pieces, static_argnames="inflate")
 W, BODIES = 6, 4
 DIRECTIONS = np.array([[0, 0, 1], [1, 0, 0], [0.6, 0.8, 0]], np.float32)
 LENGTHS = np.array([5.0, 1.0, 0.7], np.float32)

@@ -21,49 +21,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ig2mj.geometry.poses import AnyArray, quat_rotate_inverse
+from ig2mj.geometry.poses import AnyArray
 from ig2mj.scene.tables import PieceKind
 
 Interval = tuple[Float[Array, "*b"], Float[Array, "*b"]]
 
 UNBOUNDED = 1e30
 """Stands for infinity where it is multiplied with slopes that may be zero."""
-
-
-def rays_hit_pieces(
-    origins: Float[AnyArray, "*#b R 3"],
-    directions: Float[AnyArray, "*#b R 3"],
-    lengths: Float[AnyArray, "*#b R"],
-    piece_pos: Float[AnyArray, "*#b K 3"],
-    piece_quat: Float[AnyArray, "*#b K 4"],
-    piece_kind: Int[AnyArray, "K"],
-    piece_size: Float[AnyArray, "K 3"],
-    piece_planes: Float[AnyArray, "K N 4"],
-    inflate: float = 0.0,
-) -> Float[Array, "*b R K"]:
-    """Entry parameter t of every ray into every piece; inf where the ray does not enter it within its length.
-
-    `piece_pos` and `piece_quat` are world poses. The kinds, sizes and planes are `SceneTables.piece_*`. Memory is
-    b x R x K numbers; for chosen pairs of object and target see `ig2mj.geometry.targets`.
-    """
-    origin = quat_rotate_inverse(piece_quat[..., None, :, :], origins[..., :, None, :] - piece_pos[..., None, :, :])
-    direction = quat_rotate_inverse(piece_quat[..., None, :, :], directions[..., :, None, :])
-    low, high = piece_interval(piece_kind, piece_size, piece_planes, origin, direction, inflate)
-    return entry(low, high, lengths[..., :, None])
-
-
-def entry(
-    low: Float[AnyArray, "*#b"], high: Float[AnyArray, "*#b"], length: Float[AnyArray, "*#b"] | float
-) -> Float[Array, "*b"]:
-    """t at which a ray from t = 0 to `length` enters [low, high], or inf; starting inside is no entry."""
-    return jnp.where(enters(low, high, length), low, jnp.inf)
-
-
-def enters(
-    low: Float[AnyArray, "*#b"], high: Float[AnyArray, "*#b"], length: Float[AnyArray, "*#b"] | float
-) -> Bool[Array, "*b"]:
-    """Whether the ray along the line's direction enters the shape at 0 <= t <= length."""
-    return jnp.logical_and(low >= 0.0, (low <= length) & (low <= high))
 
 
 def piece_interval(
@@ -213,7 +177,7 @@ def fractions_enter(
 ) -> tuple[Bool[Array, "*b"], Bool[Array, "*b"]]:
     """Whether the rays along and against the line's direction enter, from what `clip_line` returns.
 
-    As `enters`, and as it would be for the interval [-high, -low]; again without a division.
+    A ray enters at 0 <= t <= length; one that starts inside does not. There is no division.
     """
     meets = low * high_by <= high * low_by
     forwards = meets & (low >= 0.0) & (low <= length * low_by)

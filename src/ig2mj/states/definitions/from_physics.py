@@ -8,7 +8,7 @@ import numpy as np
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations import adjacency, rooms
+from ig2mj.states.relations import rooms, traced
 from ig2mj.states.spec import Get, StateSpec
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def _rooms(model: StateModel, states: ExtendedStates, view: PhysicsView, o: int,
 
 
 def _neighbours(which: str) -> Get:
-    return lambda model, states, view, o, w: adjacency.neighbours(model, view, o, w)[which]
+    return lambda model, states, view, o, w: traced.neighbours(model, view, o, w)[which]
 
 
 def _numbers(values: Any) -> list[float]:

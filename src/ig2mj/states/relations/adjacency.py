@@ -20,8 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import AnyArray, compose
-from ig2mj.geometry.rays import rays_hit_pieces
+from ig2mj.geometry.poses import AnyArray
 from ig2mj.geometry.targets import RayTargets, lines_enter_targets
 from ig2mj.states.model import StateModel
 
@@ -85,40 +84,3 @@ class AdjacencyPairs:
         origins = jnp.asarray(view.object_com)[:, self.pairs[:, 0]]
         pos, quat = poses or (view.body_pos, view.body_quat)
         return lines_enter_targets(self.targets, pos, quat, origins, lines, lengths, INFLATE[compat])
-
-
-def neighbours(model: StateModel, view: PhysicsView, obj: int, world: int = 0) -> dict[str, list[str]]:
-    """Names of all objects that the rays of one object enter, on the host: keys above, below, beside (table A.4)."""
-    hit = np.asarray(_hits(model, view, world, jnp.asarray(view.object_com)[world, obj]))
-    tables = model.tables
-    found = {}
-    for key, rays in (("above", slice(0, 1)), ("below", slice(1, 2)), ("beside", slice(2, None))):
-        entered = np.any(hit[rays], axis=0) & (tables.piece_object >= 0) & (tables.piece_object != obj)
-        found[key] = [tables.object_names[i] for i in np.unique(tables.piece_object[entered])]
-    return found
-
-
-def _hits(model: StateModel, view: PhysicsView, world: int, origin: Float[Array, "3"]) -> Bool[Array, "R K"]:
-    """Which pieces of the scene the rays up, down and sideways from a point enter."""
-    tables, compat = model.tables, model.options.compat
-    lines = np.concatenate([VERTICAL_LINE, -VERTICAL_LINE, HORIZONTAL_LINES, -HORIZONTAL_LINES])
-    lengths = np.where(np.abs(lines[:, 2]) > 0, VERTICAL_LENGTH[compat], HORIZONTAL_LENGTH[compat])
-    body = tables.piece_body
-    pos, quat = compose(
-        jnp.asarray(view.body_pos)[world, body],
-        jnp.asarray(view.body_quat)[world, body],
-        tables.piece_pos.astype(np.float32),
-        tables.piece_quat.astype(np.float32),
-    )
-    entered = rays_hit_pieces(
-        jnp.broadcast_to(origin, lines.shape),
-        lines,
-        lengths.astype(np.float32),
-        pos,
-        quat,
-        tables.piece_kind,
-        tables.piece_size.astype(np.float32),
-        tables.piece_planes.astype(np.float32),
-        INFLATE[compat],
-    )
-    return jnp.isfinite(entered)

@@ -4,13 +4,14 @@ A goal's pairs are laid out before tracing (`plan.py`), which is fastest to run 
 numbers, and the pieces that it needs are slices of tables of the whole scene, so that one compiled program serves every
 pair. Pairs that the boxes rule out cost next to nothing.
 
-Axes: W worlds, P pairs.
+Axes: W worlds, O objects, P pairs.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +21,7 @@ from jaxtyping import Bool, Int
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import AnyArray
 from ig2mj.geometry.target_table import TargetTable
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.adjacency import AdjacencyPairs
 from ig2mj.states.relations.containment import surrounded
@@ -29,6 +31,10 @@ from ig2mj.states.relations.relations import ANSWERS, Kind, Relations
 
 PLANES_AT_ONCE = 8
 """Half-spaces in each turn of a loop (`ig2mj.geometry.rays.clip_line`): one pair is little work."""
+
+
+SCENES = 8
+"""Scenes whose program of `neighbours` is kept: those used last."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -97,3 +103,28 @@ class TracedRelations(Relations):
         positive, negative = rays.horizontal(view, (pos, quat))
         beside = jnp.any(positive | negative, axis=-1)
         return jnp.broadcast_to(beside, (len(beside), 2))
+
+
+def neighbours(model: StateModel, view: PhysicsView, obj: int, world: int = 0) -> dict[str, list[str]]:
+    """Names of all objects that the rays of one object enter, by "above", "below" and "beside" (table A.4).
+
+    On the host. The first call compiles a program, which serves all objects of the scene.
+    """
+    with GC_PAUSED:
+        found = _neighbours(model)(jax.tree.map(lambda a: np.asarray(a[world : world + 1]), view), obj)
+    names = model.tables.object_names
+    return {relation: [names[o] for o in np.flatnonzero(found[relation])] for relation in found}
+
+
+@functools.lru_cache(maxsize=SCENES)
+def _neighbours(model: StateModel) -> Callable[[PhysicsView, int], dict[str, Bool[Array, "O"]]]:
+    """The compiled part of `neighbours`: relations of an object to all others, in a view of one world."""
+    tables, count = PieceTables(model), model.tables.num_objects
+
+    @jax.jit
+    def neighbours_of(view: PhysicsView, obj: Int[Array, ""]) -> dict[str, Bool[Array, "O"]]:
+        pairs = jnp.stack([jnp.full(count, obj), jnp.arange(count)], axis=-1)
+        relations = TracedRelations(tables, view)
+        return {name: relations.answer(name, pairs)[0] for name in ("above", "below", "beside")}
+
+    return neighbours_of
