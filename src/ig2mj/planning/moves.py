@@ -170,6 +170,27 @@ def rest(hand: int) -> Program:
     return [Phase(hand=hand, reset=True, close=False, until=Until.WAITED, limit=4)]
 
 
+STRAYED, RAISED_OFF = 0.15, 0.1
+"""m from where a hand rests, or carries what it holds, beyond which it goes back; by which it is raised first."""
+
+
+def strayed(world: PlannedWorld, hand: int) -> bool:
+    """Whether a hand is not where it rests or, if it holds something, carries that: ways are planned from there."""
+    home = world.carried(hand, world.stance) if world.held[hand] else world.resting(hand, world.stance)
+    return bool(np.linalg.norm(world.grip(hand) - home) > STRAYED)
+
+
+def gather(world: PlannedWorld, hand: int) -> Generator[Program, str, None]:
+    """A hand that has strayed goes back: somebody else has moved it, or it was stopped on its way."""
+    if not strayed(world, hand):
+        return
+    if not world.held[hand]:
+        yield rest(hand)
+        return
+    up = vector3(world.grip(hand) + RAISED_OFF * UP)
+    yield [Phase(hand=hand, pos=up, tolerance=0.04, limit=15, after=""), carry(world, hand)]
+
+
 SEARCHES = 4
 """Ways of a hand that are searched for at most, where via points find none for any pose."""
 

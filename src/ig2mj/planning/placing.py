@@ -23,10 +23,12 @@ from ig2mj.planning.moves import (
     Program,
     ahead,
     first_way,
+    gather,
     hand_path,
     hand_with,
     quaternion,
     rest,
+    strayed,
     travel,
     turn_at,
     turning_point,
@@ -90,19 +92,14 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             if name not in world.held:
                 reason, detail = "slipped", f"the hand lost {name}"
                 continue
-            _, yaw = world.base
-            target, quat, rotation = grip_for(world, hand, name, spot)
-            fingers, palm = world.hand_axes(hand, rotation)
-            target = target + (LET_GO + spot.drop) * UP
-            spheres = world.spheres(fingers, palm, holding=name, hand=hand, rotation=rotation)
-            obstacles = world.obstacles([name], world.stance)
-            follows = world.follows(hand, quat, obstacles)
-            back = [UP, -ahead(yaw)]
-            start = turning_point(obstacles, spheres, world.grip(hand), yaw)
-            way = hand_path(obstacles, spheres, start, target, back, SPARE, True, follows)
-            if way is None:
+            planned = _way(world, name, hand, spot)
+            if planned is None and strayed(world, hand):
+                yield from gather(world, hand)
+                planned = _way(world, name, hand, spot) if name in world.held else None
+            if planned is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
+            start, way, target, quat, palm = planned
             keeps, turned = world.index(name), quaternion(quat)
             reason = yield [
                 *turn_at(world, hand, start, turned, keeps),
@@ -128,6 +125,23 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
         return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
     return place
+
+
+def _way(
+    world: PlannedWorld, name: str, hand: int, spot: Spot
+) -> tuple[Vector, list[Vector], Vector, Sequence[float] | np.ndarray, Vector] | None:
+    """Where a hand turns what it holds, its way from there, where it lets go, and its orientation and the direction of
+    its palm there, from where the robot stands; None: there is no way."""
+    _, yaw = world.base
+    target, quat, rotation = grip_for(world, hand, name, spot)
+    fingers, palm = world.hand_axes(hand, rotation)
+    target = target + (LET_GO + spot.drop) * UP
+    spheres = world.spheres(fingers, palm, holding=name, hand=hand, rotation=rotation)
+    obstacles = world.obstacles([name], world.stance)
+    start = turning_point(obstacles, spheres, world.grip(hand), yaw)
+    follows = world.follows(hand, quat, obstacles)
+    way = hand_path(obstacles, spheres, start, target, [UP, -ahead(yaw)], SPARE, True, follows)
+    return None if way is None else (start, way, target, quat, palm)
 
 
 def _find(

@@ -71,7 +71,7 @@ sums = {"episodes": jax.ShapeDtypeStruct((2,), jnp.float32)}
 mesh, whole, each = many._mesh, P(), P(AXIS)
 program = many._program(learner, memory, rollout, sums)
 leaves = []
-for tree, specs in ((learner, whole), (memory, many._memory_specs), (rollout, P(None, AXIS)), (sums, each)):
+for tree, specs in ((learner, whole), (memory, many._buffer_specs), (rollout, P(None, AXIS)), (sums, each)):
     leaves.append([placed(a, spec, mesh) for a, spec in zip(nonempty(tree), nonempty_specs(tree, specs))])
 rest = [placed(jax.ShapeDtypeStruct(s, t), spec, mesh) for s, t, spec in
         (((2, 2), jnp.float32, each), ((2,), jnp.uint32, whole), ((), jnp.bool_, whole))]
