@@ -39,19 +39,20 @@ def test_its_successes_are_demonstrations_that_replay_bit_for_bit(collected):
     assert done.runs == 2 and not done.differences
 
 
-def test_it_goes_on_where_somebody_else_has_acted(env):
+def test_it_goes_on_where_somebody_else_has_acted(tiny_home_folder):
+    """Random motion in a quarter of all steps, at up to a tenth of the robot's speeds; hands stay open or shut. Without
+    it an episode takes 119 steps, so that each of six worlds has time for two."""
+    env = ig2mj.make(f"goal/{tiny_home_folder} (on_top apple pan)", worlds=6, engine="native", pool_size=1)
     expert, rng = expert_of(env), np.random.default_rng(0)
     assert isinstance(expert, PlannedExpert)
     state, won = env.reset(0), 0
-    for step in range(500):
+    for step in range(300):
         label = expert(state)
-        assert label.shape == (2, env.action_space.shape[0]) and np.abs(label).max() <= 1.0
-        other = rng.uniform(-0.3, 0.3, label.shape).astype(np.float32)
+        assert label.shape == (6, env.action_space.shape[0]) and np.abs(label).max() <= 1.0
+        other = np.where(expert.noisy, rng.uniform(-0.1, 0.1, label.shape), label).astype(np.float32)
         state = env.step_autoreset(state, other if step % 20 < 5 else label)
         won += int(np.asarray(state.info["success"]).sum())
-        if won >= 2:
-            break
-    assert won >= 2 and expert.planned == 2
+    assert won >= 6 and expert.planned == 2
 
 
 def test_dagger_and_bc_learn_from_its_demonstrations(env, collected, tmp_path, capsys):

@@ -1,5 +1,6 @@
 """Primitives that the humanoid carries out by its own actions, in the tiny home of the tests."""
 
+import numpy as np
 import pytest
 
 import ig2mj
@@ -67,6 +68,20 @@ def test_requests_that_cannot_be_carried_out_are_refused(tiny_home_folder):
         agent.do("gasp", "apple")
     with pytest.raises(UnknownNameError, match="no robot is named 'fetch'"):
         simulation.robots["fetch"]
+
+
+@pytest.mark.slow
+def test_a_hand_that_somebody_else_has_moved_goes_back_before_the_robot_goes_on(tiny_home_folder):
+    """At rest a hand is at the height of counters: what it holds there would wedge the robot in, and cannot be turned
+    next to its body."""
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[Humanoid().at(-0.1, 0.7, -1.5)])
+    agent = BatchAgent.of_scene(scene, 1)
+    assert agent.do("grasp", "apple")[0].done
+    names = agent.rung.stage.controller.action_names
+    for _ in range(6):
+        agent.rung.stage.act(np.array([[1.0 * name.endswith("_reset") for name in names]], np.float32))
+    outcome = agent.do("place_on_top", "apple", "pan")[0]
+    assert outcome.done and outcome.time < 40.0
 
 
 def test_scenes_without_robots_say_so(tiny_home):

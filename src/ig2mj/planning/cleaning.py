@@ -20,7 +20,7 @@ from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp
 from ig2mj.planning.handing_over import hand_over
-from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_path, hand_with, travel, vector3
+from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_path, hand_with, strayed, travel, vector3
 from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.stances import stances
@@ -39,9 +39,6 @@ PRESSES = 4
 
 RAISED = 0.25
 """m that a tool is lifted before the hand goes back to where it carries it."""
-
-STRAYED = 0.15
-"""m from where a hand carries the tool beyond which it goes back before the robot drives."""
 
 TURNS = (np.pi / 2, -np.pi / 2, np.pi)
 """rad about a face's normal by which a tool is turned where it has no room otherwise."""
@@ -104,7 +101,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 plan = _plan(world, tool, hand, spots, visited)
             if plan is None:
                 break
-            if _strayed(world, hand):
+            if strayed(world, hand):
                 yield _back(world, hand)
                 if tool not in world.held:
                     continue
@@ -118,7 +115,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 if not world.facts.holds(predicate, name) or tool not in world.held:
                     break
                 program = _program(world, tool, hand, plan, stroke[0])
-                if not program and _strayed(world, hand):
+                if not program and strayed(world, hand):
                     yield _back(world, hand)
                     program = _program(world, tool, hand, plan, stroke[0]) if tool in world.held else []
                 if program:
@@ -335,11 +332,6 @@ def _turned(world: PlannedWorld, tool: str, hand: int, region: _Region, normal: 
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     rotation = (np.eye(3) + s * k + (1 - c) * (k @ k)) @ region.rotation
     return _Region.turned(rotation, points)
-
-
-def _strayed(world: PlannedWorld, hand: int) -> bool:
-    """Whether a hand is not where it carries what it holds."""
-    return bool(np.linalg.norm(world.grip(hand) - world.carried(hand, world.stance)) > STRAYED)
 
 
 def _back(world: PlannedWorld, hand: int) -> Program:

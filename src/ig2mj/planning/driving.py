@@ -12,7 +12,7 @@ from collections.abc import Generator
 import numpy as np
 
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
-from ig2mj.planning.moves import UP, Program, rest, vector3
+from ig2mj.planning.moves import UP, Program, go_home, strayed, vector3
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.planning.stances import clear_with_held
@@ -23,9 +23,6 @@ BACK = np.arange(0.0, 1.25, 0.1)
 
 NEAR = 1.0
 """m from the middle of an object at which a base without hands is near it."""
-
-STRAYED = 0.15
-"""m from where an empty hand rests beyond which it goes back before the robot drives."""
 
 SLIGHT = 0.02
 """m of stretching and stooping that do not count."""
@@ -52,8 +49,9 @@ def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     if apart < 0.04 and turned < 0.1:
         return (yield [stretch(stance.rise)]) if rises or stoops else ""
     for hand, name in enumerate(world.held):
-        if not name and np.linalg.norm(world.grip(hand) - world.resting(hand, world.stance)) > STRAYED:
-            yield rest(hand)
+        carries = bool(name) and not world.domain.fixed(name) and world.held.count(name) == 1
+        if (not name or carries) and strayed(world, hand):
+            yield go_home(world, hand)
     if stoops:
         yield [stretch(0.0)]
     last = [stretch(stance.rise)] if rises else []

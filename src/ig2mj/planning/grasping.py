@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Generator, Iterator, Sequence
 
 import numpy as np
@@ -19,6 +20,7 @@ from ig2mj.planning.moves import (
     carry,
     first_way,
     free_hand,
+    from_home,
     hand_path,
     hand_with,
     rest,
@@ -40,6 +42,9 @@ Prefers = Callable[[GraspPose], float]
 
 CLEARLY = 0.05
 """By which a pose has to be better than another to come before it."""
+
+MOVED = 0.03
+"""m that an object has moved beyond which its grasp is planned again."""
 
 POSES, WAYS = 6, 40
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
@@ -70,9 +75,12 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         if found is None:
             reason, detail = "no_base", f"no free floor from which a hand has a way to {name}"
             continue
-        stance, pose = found
+        (stance, pose), before = found, world.com(name)
         if reason := (yield from go(world, stance)):
             detail = f"no way leads to where a hand reaches {name}"
+            continue
+        if np.linalg.norm(world.com(name) - before) > MOVED:
+            reason, detail = "no_grasp", f"{name} was moved while the robot went there"
             continue
         tried.append(pose)
         reason, detail = yield from _take(world, name, hand, pose)
@@ -89,12 +97,8 @@ def is_graspable(world: PlannedWorld, name: str) -> bool:
 def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generator[Program, str, tuple[str, str]]:
     """Takes an object from where the robot stands; returns why it did not, as a reason and in words."""
     index = world.index(name)
-    here, _ = world.base
-    start = pose.at(pose.before)
-    spheres = world.spheres(pose.fingers, pose.palm)
-    quat, obstacles = world.body.turned(hand, pose.fingers, pose.palm), world.obstacles([name])
-    follows = world.follows(hand, quat, obstacles)
-    way = hand_path(obstacles, spheres, world.grip(hand), start, entries(pose, here), search=True, follows=follows)
+    start, quat = pose.at(pose.before), world.body.turned(hand, pose.fingers, pose.palm)
+    way = yield from from_home(world, hand, functools.partial(_way, world, name, hand, pose))
     if way is None:
         return "no_path", f"the hand has no way to {name}"
     lift = LIFT * UP * float(pose.palm @ UP > -0.9)
@@ -118,6 +122,14 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     yield [Phase(hand=hand, close=False, pos=back, limit=10, after=""), *travel(hand, way[-2::-1], None), *rest(hand)]
     detail = f"the hand closed on {name} and does not hold it" if reason == "no_grasp" else ""
     return reason or "slipped", detail
+
+
+def _way(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> list[Vector] | None:
+    """The hand's way to before a grasp, from where the robot stands; None: there is none."""
+    obstacles, spheres = world.obstacles([name]), world.spheres(pose.fingers, pose.palm)
+    follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles)
+    back = entries(pose, world.base[0])
+    return hand_path(obstacles, spheres, world.grip(hand), pose.at(pose.before), back, search=True, follows=follows)
 
 
 def entries(pose: GraspPose, xy: Sequence[float] | np.ndarray) -> list[Vector]:

@@ -171,7 +171,9 @@ def rest(hand: int) -> Program:
 
 
 STRAYED, RAISED_OFF = 0.15, 0.1
-"""m from where a hand rests, or carries what it holds, beyond which it goes back; by which it is raised first."""
+"""m from where a hand rests, or carries what it holds, beyond which it has strayed; by which it is raised first."""
+
+Found = TypeVar("Found")
 
 
 def strayed(world: PlannedWorld, hand: int) -> bool:
@@ -180,15 +182,24 @@ def strayed(world: PlannedWorld, hand: int) -> bool:
     return bool(np.linalg.norm(world.grip(hand) - home) > STRAYED)
 
 
-def gather(world: PlannedWorld, hand: int) -> Generator[Program, str, None]:
-    """A hand that has strayed goes back: somebody else has moved it, or it was stopped on its way."""
-    if not strayed(world, hand):
-        return
+def go_home(world: PlannedWorld, hand: int) -> Program:
+    """A hand goes back to where it rests or, if it holds something, carries that; raised first, off what it is at."""
     if not world.held[hand]:
-        yield rest(hand)
-        return
+        return rest(hand)
     up = vector3(world.grip(hand) + RAISED_OFF * UP)
-    yield [Phase(hand=hand, pos=up, tolerance=0.04, limit=15, after=""), carry(world, hand)]
+    return [Phase(hand=hand, pos=up, tolerance=0.04, limit=15, after=""), carry(world, hand)]
+
+
+def from_home(
+    world: PlannedWorld, hand: int, plan: Callable[[], Found | None]
+) -> Generator[Program, str, Found | None]:
+    """What `plan` finds for a hand. Where it finds nothing and the hand has strayed, because somebody else has moved it
+    or it was stopped on its way, the hand goes back first."""
+    found, held = plan(), world.held[hand]
+    if found or not strayed(world, hand):
+        return found
+    yield go_home(world, hand)
+    return plan() if world.held[hand] == held else None
 
 
 SEARCHES = 4

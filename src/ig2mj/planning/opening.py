@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import dataclasses
+import functools
 from collections.abc import Callable, Generator
 
 import numpy as np
@@ -21,6 +22,7 @@ from ig2mj.planning.moves import (
     Program,
     ahead,
     free_hand,
+    from_home,
     hand_path,
     rest,
     travel,
@@ -148,7 +150,7 @@ def move_joint(
         return "no_base", f"no free floor from which a hand can move {joint.name}"
     if reason := (yield from go(world, found.stance)):
         return reason, f"no way leads to where a hand can move {joint.name}"
-    program = _program(world, joint, hand, found)
+    program = yield from from_home(world, hand, functools.partial(_program, world, joint, hand, found))
     if program is None:
         return "no_path", f"the hand has no way to {joint.name}"
     reason = yield program

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
 import numpy as np
@@ -23,12 +24,11 @@ from ig2mj.planning.moves import (
     Program,
     ahead,
     first_way,
-    gather,
+    from_home,
     hand_path,
     hand_with,
     quaternion,
     rest,
-    strayed,
     travel,
     turn_at,
     turning_point,
@@ -92,10 +92,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             if name not in world.held:
                 reason, detail = "slipped", f"the hand lost {name}"
                 continue
-            planned = _way(world, name, hand, spot)
-            if planned is None and strayed(world, hand):
-                yield from gather(world, hand)
-                planned = _way(world, name, hand, spot) if name in world.held else None
+            planned = yield from from_home(world, hand, functools.partial(_way, world, name, hand, spot))
             if planned is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue

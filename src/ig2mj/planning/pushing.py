@@ -3,6 +3,7 @@ pushed there over the floor or a table, by a palm on its far side."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,6 +18,7 @@ from ig2mj.planning.moves import (
     ahead,
     first_way,
     free_hand,
+    from_home,
     hand_path,
     rest,
     travel,
@@ -69,7 +71,8 @@ def push(world: PlannedWorld, step: Step) -> Primitive:
         if reason := (yield from go(world, stance)):
             failed += 1
             continue
-        program = _program(world, name, other, hand, point, direction)
+        plan = functools.partial(_program, world, name, other, hand, point, direction)
+        program = yield from from_home(world, hand, plan)
         if not program:
             reason, detail, failed = "no_path", f"the hand has no way to {name}", failed + 1
             continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -15,6 +16,7 @@ from ig2mj.planning.moves import (
     Primitive,
     first_way,
     free_hand,
+    from_home,
     hand_path,
     rest,
     towards,
@@ -63,9 +65,7 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
                 continue
             fingers = towards(world.base[0], button)
             quat = world.body.turned(hand, fingers, DOWN)
-            obstacles, spheres = world.obstacles(), world.spheres(fingers)
-            follows, back = world.follows(hand, quat, obstacles), [UP, -fingers]
-            way = hand_path(obstacles, spheres, world.grip(hand), aim, back, search=True, follows=follows)
+            way = yield from from_home(world, hand, functools.partial(_way, world, hand, aim, fingers))
             if way is None:
                 reason, detail = "no_path", f"the hand has no way to the button of {name}"
                 continue
@@ -82,6 +82,13 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
         return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
     return toggle
+
+
+def _way(world: PlannedWorld, hand: int, aim: Vector, fingers: Vector) -> list[Vector] | None:
+    """The way of a hand with its palm down to a point, from where the robot stands; None: there is none."""
+    obstacles, spheres = world.obstacles(), world.spheres(fingers)
+    follows = world.follows(hand, world.body.turned(hand, fingers, DOWN), obstacles)
+    return hand_path(obstacles, spheres, world.grip(hand), aim, [UP, -fingers], search=True, follows=follows)
 
 
 def _pressing(button: Vector, fingers: Vector, lower: float) -> Vector:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Generator, Iterator, Sequence
 
 import numpy as np
@@ -18,6 +19,7 @@ from ig2mj.planning.moves import (
     ahead,
     carry,
     first_way,
+    from_home,
     hand_path,
     hand_with,
     travel,
@@ -101,18 +103,25 @@ def _hold_at(
         turned = turned @ about_vertical(now - stance.yaw)
         if (yield from go(world, stance)):
             continue
-        back, obstacles = [UP, -ahead(world.base[1])], world.obstacles([name], world.stance)
-        spheres, follows = (
-            _spheres(world, name, hand, turned),
-            world.follows(hand, world.turned_hand(hand, turned), obstacles),
-        )
-        start = turning_point(obstacles, spheres, world.grip(hand), world.base[1])
-        way = hand_path(obstacles, spheres, start, target, back, search=True, follows=follows)
-        if way is not None:
+        planned = yield from from_home(world, hand, functools.partial(_way, world, name, hand, target, turned))
+        if planned is not None:
+            start, way = planned
             quat, keeps = world.turned_hand(hand, turned), world.index(name)
             reason = yield [*turn_at(world, hand, start, quat, keeps), *travel(hand, way, quat, keeps=keeps)]
             return reason, way, hold.number
     return "no_path", [], -1
+
+
+def _way(
+    world: PlannedWorld, name: str, hand: int, target: Vector, turned: Rotation
+) -> tuple[Vector, list[Vector]] | None:
+    """Where a hand turns what it holds, and its way from there, from where the robot stands; None: there is none."""
+    back, obstacles = [UP, -ahead(world.base[1])], world.obstacles([name], world.stance)
+    spheres = _spheres(world, name, hand, turned)
+    follows = world.follows(hand, world.turned_hand(hand, turned), obstacles)
+    start = turning_point(obstacles, spheres, world.grip(hand), world.base[1])
+    way = hand_path(obstacles, spheres, start, target, back, search=True, follows=follows)
+    return None if way is None else (start, way)
 
 
 def _holds_at(world: PlannedWorld, name: str, hand: int, points: Sequence[Vector], link: int = -1) -> list[_Hold]:
