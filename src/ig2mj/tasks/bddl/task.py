@@ -11,6 +11,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import hashlib
+import json
 import sys
 from collections.abc import Iterator
 
@@ -19,6 +20,7 @@ import numpy as np
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.files.content import read_text
 from ig2mj.process.progress import progress
+from ig2mj.sampling import surface_particles
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder, shipped_homes
 from ig2mj.scene.scene import Scene
@@ -147,7 +149,12 @@ def activity_states(task: BddlTask, split: str = "train") -> StartStates:
         raise UnknownNameError("split", split, SEEDS)
     bare = load_bound(task.binding, added=task.added)
     conditions = [c.expression for c in start_conditions(task.binding, bare)]
+    dirty = any(word in json.dumps(conditions, default=str) for word in ("dusty", "stained"))
+    rules = [surface_particles.VERSION] if dirty else []
     short = task.name.removeprefix(PREFIX)
     return StartStates(
-        f"{short}-{split}", bare, lambda digest: [VERSION, digest, conditions], {"task": task.name, "split": split}
+        f"{short}-{split}",
+        bare,
+        lambda digest: [VERSION, digest, conditions, *rules],
+        {"task": task.name, "split": split},
     )
