@@ -1,4 +1,4 @@
-"""Dust and stains lie where they can be seen and wiped: of floors on the surface alone, of what is shut on the outside."""
+"""Dust and stains lie where they can be seen and wiped: on top of floors, on the outside of what is shut."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ from ig2mj.planning.task_planner import TaskPlanner
 from ig2mj.process import entry_point
 from ig2mj.sampling.query import SceneQuery
 
-SECONDS_PER_STEP, SECONDS_MORE = 60.0, 100.0
+SECONDS_PER_STEP, SECONDS_MORE = 120.0, 200.0
 """Simulated s of an episode's horizon: for each step of its plan, and more, as long as BEHAVIOR's activities last."""
 
 PLAN = "plan"

@@ -15,10 +15,9 @@ from jaxtyping import Float
 
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.bodies import Follower
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.driving import go
-from ig2mj.planning.grasping import grasp
+from ig2mj.planning.grasping import grasp, put_down_others
 from ig2mj.planning.handing_over import hand_over
 from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_path, hand_with, strayed, travel, vector3
 from ig2mj.planning.opening import Tried, open_around
@@ -31,8 +30,9 @@ from ig2mj.planning.world import DirtSpot, PlannedWorld, Rotation, Stance, Vecto
 ROUNDS, STROKES = 24, 8
 """Stances from which an object is cleaned, and places of the tool for each, at most."""
 
-PRESSED, LIFTED, SLACK = 0.02, 0.06, 0.01
-"""m that a tool is pressed into a face, and is lifted off it; by which particles may be outside of its box."""
+PRESSED, LIFTED, CLOSE, SLACK = 0.02, 0.06, 0.03, 0.0
+"""m that a tool is pressed into a face, and is lifted off it, also where there is less room; by which particles may be
+outside of its box."""
 
 PRESSES = 4
 """Agent steps that a tool is pressed: with each the hand is pulled farther into the face."""
@@ -43,6 +43,9 @@ RAISED = 0.25
 TURNS = (np.pi / 2, -np.pi / 2, np.pi)
 """rad about a face's normal by which a tool is turned where it has no room otherwise."""
 
+TILTS = (-0.8, 0.8)
+"""rad about an axis in a face by which a tool is tilted."""
+
 LOWEST = -0.3
 """Smallest z of the normal of a face that is cleaned."""
 
@@ -51,6 +54,9 @@ OVER_TOP = 1.0
 
 NEAREST, STANCES, FEW = 8, 4, 4
 """Particles that stances are looked for, stances for each, and strokes of each of which one has to have a way."""
+
+ENOUGH, OVERS = 6, 3
+"""Particles that are enough for a stance, and turns of a tool in which ways over a rim are looked for."""
 
 TRIES = 4
 """Times that a particle is gone for."""
@@ -74,6 +80,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
         if predicate == "stained" and not world.facts.holds("soaked", tool):
             return Outcome("no_grasp", f"{tool} is not soaked")
         if world.domain.has(tool, "toggleable") and not world.facts.holds("toggled_on", tool):
+            yield from put_down_others(world, tool)
             yield from toggle(True)(world, Step("toggle_on", (tool,)))
         reason, detail, lost, tried = "no_base", f"no dirt of {name} is in reach", 0, collections.Counter[int]()
         visited: list[Stance] = []
@@ -88,8 +95,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                     return Outcome("slipped", f"the hand lost {tool}", attempts=attempt + 1)
             hand = hand_with(world, tool)
             if _is_covered(world, tool, hand):
-                if all(world.held):
-                    return Outcome("no_grasp", f"the hand covers the side of {tool} that cleans, and none is free")
+                yield from put_down_others(world, tool)
                 if failed := (yield from hand_over(world, tool, hand)):
                     reason, detail = failed, f"{tool} cannot be taken by the side that does not clean"
                     continue
@@ -111,13 +117,15 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 tried.update(spot.number for spot in plan.covered)
                 continue
             for stroke in plan.strokes:
-                tried.update(spot.number for spot in stroke)
+                tried[stroke.spot.number] += 1
                 if not world.facts.holds(predicate, name) or tool not in world.held:
                     break
-                program = _program(world, tool, hand, plan, stroke[0])
+                if stroke.spot.number not in {spot.number for spot in world.dirt(predicate, name)}:
+                    continue
+                program = _program(world, tool, hand, stroke)
                 if not program and strayed(world, hand):
                     yield _back(world, hand)
-                    program = _program(world, tool, hand, plan, stroke[0]) if tool in world.held else []
+                    program = _program(world, tool, hand, stroke) if tool in world.held else []
                 if program:
                     reason, detail = (yield program), f"{tool} did not take enough off {name}"
         if tool in world.held:
@@ -132,12 +140,13 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Region:
     """Where a held tool cleans when it is turned by `rotation`: corners of the part that cleans, and their box, m from
-    the hand's grasp point."""
+    the hand's grasp point; `lifted`: m off a face from which on the tool is pressed on it."""
 
     rotation: Rotation
     corners: Float[np.ndarray, "n 3"]
     low: Vector
     high: Vector
+    lifted: float = LIFTED
 
     @classmethod
     def turned(cls, rotation: Rotation, corners: Float[np.ndarray, "n 3"]) -> _Region:
@@ -150,18 +159,41 @@ class _Region:
         depth = float(np.ptp(self.corners @ spot.normal)) / 2
         return spot.pos + spot.normal * (depth - PRESSED) - (self.low + self.high) / 2
 
+    def above(self, spot: DirtSpot) -> Vector:
+        """Grasp point of the hand right before."""
+        return self.at(spot) + self.lifted * spot.normal
+
     def covers(self, grip: Vector, spots: Sequence[DirtSpot]) -> list[DirtSpot]:
         low, high = grip + self.low - SLACK, grip + self.high + SLACK
         return [s for s in spots if (low <= s.pos).all() and (s.pos <= high).all()]
 
 
-def _regions(world: PlannedWorld, tool: str, hand: int, stance: Stance, normal: Vector) -> list[_Region]:
-    """Turns of a tool with its box: with its cleaning area towards the face; as it is carried."""
+def _regions(world: PlannedWorld, tool: str, hand: int, yaw: float, normal: Vector) -> list[_Region]:
+    """Turns of a tool with its box, for a robot that looks along `yaw`, rad: with its cleaning area towards the face;
+    as it is carried; of a hand that floats, turned about the normal and tilted, too, and close to the face, where there
+    is less room. A tilted tool cleans in a larger box."""
     area, out = _area(world, tool)
     points = (world.vertices(tool) if area is None else area) - world.grip(hand)
-    carried = about_vertical(stance.yaw - world.base[1])
-    rotations = [carried] if area is None else [turn_onto(carried @ out, -normal) @ carried, carried]
-    return [_Region.turned(r, points) for r in rotations]
+    carried = about_vertical(yaw - world.base[1])
+    facing = carried if area is None else turn_onto(carried @ out, -normal) @ carried
+    rotations = [facing] if area is None else [facing, carried]
+    if world.body.opening is not None:
+        return [_Region.turned(r, points) for r in rotations]
+    rotations += [_about(normal, angle) @ facing for angle in TURNS]
+    across = np.cross(normal, UP) if abs(normal[2]) < 0.9 else np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+    across = across / np.linalg.norm(across)
+    tilts = [_about(axis, angle) for axis in (across, np.cross(normal, across)) for angle in TILTS]
+    rotations += [tilt @ facing for tilt in tilts] + [tilt @ _about(normal, np.pi / 2) @ facing for tilt in tilts]
+    found = [_Region.turned(r, points) for r in rotations]
+    return found + [dataclasses.replace(r, lifted=CLOSE) for r in found]
+
+
+def _about(axis: Vector, angle: float) -> Rotation:
+    """Rotation about a unit vector, rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = axis
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + s * k + (1 - c) * (k @ k)
 
 
 def _area(world: PlannedWorld, tool: str) -> tuple[Float[np.ndarray, "8 3"] | None, Vector]:
@@ -188,17 +220,24 @@ def _is_covered(world: PlannedWorld, tool: str, hand: int) -> bool:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class _Stroke:
+    """A particle that a tool is pressed on, the number of its turn, and all particles that it takes off there."""
+
+    spot: DirtSpot
+    turn: int
+    covered: list[DirtSpot]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class _CleanPlan:
-    """From where, and with which of its turns, a tool is pressed on particles one after another; each of `strokes` is
-    that one, and the others that it takes off with it."""
+    """From where a tool is pressed on particles one after another."""
 
     stance: Stance
-    turn: int
-    strokes: list[list[DirtSpot]]
+    strokes: list[_Stroke]
 
     @property
     def covered(self) -> list[DirtSpot]:
-        return [spot for stroke in self.strokes for spot in stroke]
+        return [spot for stroke in self.strokes for spot in stroke.covered]
 
 
 def _plan(
@@ -209,83 +248,98 @@ def _plan(
     spots = [s for s in spots if s.normal[2] > LOWEST]
     away = world.away(world.spheres(*world.hand_axes(hand), holding=tool, hand=hand))
     best: _CleanPlan | None = None
+    seen = [*visited]
     for aim in spots[:NEAREST]:
         for stance in stances(world, hand, aim.pos + PRESSED * aim.normal, floor, away, STANCES):
-            if any(np.linalg.norm(np.subtract(stance.xy, v.xy)) < ELSEWHERE for v in visited):
+            if any(np.linalg.norm(np.subtract(stance.xy, v.xy)) < ELSEWHERE for v in seen):
                 continue
-            for turn, region in enumerate(_regions(world, tool, hand, stance, aim.normal)):
-                standing, start = obstacles.about(stance.xy, *world.body.trunk), world.carried(hand, stance)
-                clear = _room(standing, _spheres(world, tool, hand, region))
-                over = _reach_over(world, tool, hand, standing, stance, region, start)
-                plan = _strokes(world, hand, stance, turn, region, spots, clear, over)
-                if plan is None or (best is not None and len(plan.covered) <= len(best.covered)):
-                    continue
-                yaw = stance.yaw
-                follows = world.follows(hand, world.turned_hand(hand, region.rotation), standing, stance)
-                if any(
-                    _way(world, tool, hand, standing, yaw, region, start, stroke[0], follows)
-                    for stroke in plan.strokes[:FEW]
-                ):
-                    best = plan
+            seen.append(stance)
+            plan = _From(world, tool, hand, stance, obstacles).plan(spots)
+            if plan is not None and (best is None or len(plan.covered) > len(best.covered)):
+                best = plan
+            if best is not None and len(best.covered) >= ENOUGH:
+                return best
     return best
 
 
-def _reach_over(
-    world: PlannedWorld,
-    tool: str,
-    hand: int,
-    standing: Obstacles,
-    stance: Stance,
-    region: _Region,
-    start: Vector,
-) -> Callable[[DirtSpot], bool]:
-    """Whether the hand comes to a face that looks away from the robot, as to the near inner side of a bathtub."""
-    follows = world.follows(hand, world.turned_hand(hand, region.rotation), standing, stance)
-    return lambda spot: bool(_way(world, tool, hand, standing, stance.yaw, region, start, spot, follows))
+class _From:
+    """Strokes of a tool from one stance."""
+
+    def __init__(self, world: PlannedWorld, tool: str, hand: int, stance: Stance, obstacles: Obstacles):
+        """`obstacles`: all but the tool."""
+        self._world, self._tool, self._hand, self._stance = world, tool, hand, stance
+        self._obstacles = obstacles.about(stance.xy, *world.body.trunk)
+        self._start = world.carried(hand, stance)
+        self._known: dict[tuple[float, ...], list[tuple[_Region, np.ndarray]]] = {}
+
+    def plan(self, spots: Sequence[DirtSpot]) -> _CleanPlan | None:
+        """Places of the tool that cover most particles in reach, each next to the one before; None: the hand has a way
+        to none of the first ones."""
+        near = [(s, turn) for s in spots if (turn := self._turn(s)) >= 0]
+        left, strokes = [s for s, _ in near], list[_Stroke]()
+        turns = {s.number: turn for s, turn in near}
+        while left and len(strokes) < STROKES:
+            sets = []
+            for s in left:
+                region, _ = self._turned(s.normal)[turns[s.number]]
+                sets.append(region.covers(region.at(s), spots))
+            best = int(np.argmax([len(c) for c in sets]))
+            gone = {s.number for s in sets[best]} | {left[best].number}
+            taken = {s.number for stroke in strokes for s in stroke.covered}
+            own = [s for s in spots if s.number in gone - taken]
+            strokes.append(_Stroke(left[best], turns[left[best].number], own))
+            left = [s for s in left if s.number not in gone]
+        strokes = _one_after_another(strokes)
+        if not any(self.way(stroke.spot, stroke.turn) for stroke in strokes[:FEW]):
+            return None
+        return _CleanPlan(self._stance, strokes)
+
+    def _turned(self, normal: Vector) -> list[tuple[_Region, np.ndarray]]:
+        """Turns of the tool for faces with a normal, and spheres of the hand with it."""
+        key = tuple(np.round(normal, 2))
+        if key not in self._known:
+            world, tool, hand = self._world, self._tool, self._hand
+            regions = _regions(world, tool, hand, self._stance.yaw, normal)
+            self._known[key] = [(r, _spheres(world, tool, hand, r)) for r in regions]
+        return self._known[key]
+
+    def _turn(self, spot: DirtSpot) -> int:
+        """The first turn of the tool in which the hand has room at a particle; -1: there is none."""
+        here = np.array(self._stance.xy)
+        to_robot = spot.normal[2] > 0.5 or (here - spot.pos[:2]) @ spot.normal[:2] > 0
+        if not to_robot and spot.pos[2] >= OVER_TOP:
+            return -1
+        for turn, (region, spheres) in enumerate(self._turned(spot.normal)):
+            if not self._world.reaches(self._hand, self._stance, region.at(spot)):
+                continue
+            if not self._obstacles.clear(spheres + np.array([*region.above(spot), 0.0])):
+                continue
+            if to_robot or self.way(spot, turn):  # over the rim of a bathtub to its near inner side
+                return turn
+            if turn >= OVERS:
+                break
+        return -1
+
+    def way(self, spot: DirtSpot, turn: int) -> list[Vector] | None:
+        """The hand's way to above a particle; None: there is none."""
+        world, hand = self._world, self._hand
+        region, spheres = self._turned(spot.normal)[turn]
+        follows = world.follows(hand, world.turned_hand(hand, region.rotation), self._obstacles, self._stance)
+        back = [UP, -ahead(self._stance.yaw), spot.normal]
+        return hand_path(self._obstacles, spheres, self._start, region.above(spot), back, follows=follows)
 
 
-def _room(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"]) -> Callable[[Vector], bool]:
-    """Whether the hand with the tool has room at a point."""
-    return lambda at: obstacles.clear(np.column_stack([spheres[:, :3] + at, spheres[:, 3]]))
-
-
-def _strokes(
-    world: PlannedWorld,
-    hand: int,
-    stance: Stance,
-    turn: int,
-    region: _Region,
-    spots: Sequence[DirtSpot],
-    clear: Callable[[Vector], bool],
-    over: Callable[[DirtSpot], bool],
-) -> _CleanPlan | None:
-    """Places of the tool that cover most particles in reach from a stance, each next to the one before; `clear`: the
-    hand has room there; `over`: it comes to a face that looks away."""
-    here = np.array(stance.xy)
-    near = [
-        s
-        for s in spots
-        if world.reaches(hand, stance, region.at(s))
-        and clear(region.at(s) + LIFTED * s.normal)
-        and (s.normal[2] > 0.5 or (here - s.pos[:2]) @ s.normal[:2] > 0 or (s.pos[2] < OVER_TOP and over(s)))
-    ]
-    left, strokes = list(near), []
-    while left and len(strokes) < STROKES:
-        sets = [region.covers(region.at(s), left) for s in left]
-        best = int(np.argmax([len(c) for c in sets]))
-        gone = {s.number for s in sets[best]} - {left[best].number}
-        strokes.append([left[best], *(s for s in left if s.number in gone)])
-        left = [s for s in left if s.number not in gone and s is not strokes[-1][0]]
-    if not strokes:
-        return None
-    strokes.sort(key=lambda stroke: (stroke[0].normal[2] < 0.5, -round(float(stroke[0].pos[2]), 1)))
-    ordered = [strokes.pop(0)]
-    while strokes:  # the upper sides first, from one place to the next
-        level = [s for s in strokes if abs(s[0].pos[2] - strokes[0][0].pos[2]) < 0.1]
-        nearest = min(level, key=lambda s: float(np.linalg.norm(s[0].pos - ordered[-1][0].pos)))
-        strokes.remove(nearest)
+def _one_after_another(strokes: list[_Stroke]) -> list[_Stroke]:
+    """Upper sides first, from one place to the next."""
+    left = sorted(strokes, key=lambda stroke: (stroke.spot.normal[2] < 0.5, -round(float(stroke.spot.pos[2]), 1)))
+    ordered = left[:1]
+    left = left[1:]
+    while left:
+        level = [s for s in left if abs(s.spot.pos[2] - left[0].spot.pos[2]) < 0.1]
+        nearest = min(level, key=lambda s: float(np.linalg.norm(s.spot.pos - ordered[-1].spot.pos)))
+        left.remove(nearest)
         ordered.append(nearest)
-    return _CleanPlan(stance, turn, ordered)
+    return ordered
 
 
 def _spheres(world: PlannedWorld, tool: str, hand: int, region: _Region) -> Float[np.ndarray, "S 4"]:
@@ -293,33 +347,29 @@ def _spheres(world: PlannedWorld, tool: str, hand: int, region: _Region) -> Floa
     return world.spheres(*axes, holding=tool, hand=hand, rotation=region.rotation)
 
 
-def _way(
-    world: PlannedWorld,
-    tool: str,
-    hand: int,
-    obstacles: Obstacles,
-    yaw: float,
-    region: _Region,
-    start: Vector,
-    spot: DirtSpot,
-    follows: Follower | None = None,
-) -> list[Vector] | None:
-    """The hand's way to above a particle; None: there is none."""
-    spheres, goal = _spheres(world, tool, hand, region), region.at(spot) + LIFTED * spot.normal
-    return hand_path(obstacles, spheres, start, goal, [UP, -ahead(yaw)], follows=follows)
-
-
-def _program(world: PlannedWorld, tool: str, hand: int, plan: _CleanPlan, spot: DirtSpot) -> Program:
-    """Presses the tool on a particle and lifts it; nothing where the hand has no way there."""
-    obstacles, stance = world.obstacles([tool], world.stance), world.stance
-    regions = _regions(world, tool, hand, stance, spot.normal)
-    regions = [regions[min(plan.turn, len(regions) - 1)]]
-    regions += [_turned(world, tool, hand, regions[0], spot.normal, angle) for angle in TURNS]
-    for region in regions:
+def _program(world: PlannedWorld, tool: str, hand: int, stroke: _Stroke) -> Program:
+    """Presses the tool on a particle and lifts it; nothing where the hand has no way there. The planned turn of the
+    tool is tried first."""
+    obstacles, stance, spot = world.obstacles([tool], world.stance), world.stance, stroke.spot
+    regions = _regions(world, tool, hand, stance.yaw, spot.normal)
+    planned = regions[min(stroke.turn, len(regions) - 1)]
+    if world.body.opening is not None:
+        regions = [planned, *(_turned(world, tool, hand, planned, spot.normal, angle) for angle in TURNS)]
+    ways = 0
+    for region in [planned, *(r for r in regions if r is not planned)]:
+        if not world.reaches(hand, stance, region.at(spot)):
+            continue
+        spheres = _spheres(world, tool, hand, region)
+        if not obstacles.clear(spheres + np.array([*region.above(spot), 0.0])):
+            continue
         follows = world.follows(hand, world.turned_hand(hand, region.rotation), obstacles)
-        way = _way(world, tool, hand, obstacles, stance.yaw, region, world.grip(hand), spot, follows)
+        back = [UP, -ahead(stance.yaw), spot.normal]
+        way = hand_path(obstacles, spheres, world.grip(hand), region.above(spot), back, follows=follows)
         if way is not None:
             return _press(world, tool, hand, region, spot, way)
+        ways += 1
+        if ways == FEW:
+            break
     return []
 
 
@@ -327,11 +377,7 @@ def _turned(world: PlannedWorld, tool: str, hand: int, region: _Region, normal: 
     """The same tool turned about the normal of a face, rad."""
     area, _ = _area(world, tool)
     points = (world.vertices(tool) if area is None else area) - world.grip(hand)
-    c, s = np.cos(angle), np.sin(angle)
-    x, y, z = normal
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    rotation = (np.eye(3) + s * k + (1 - c) * (k @ k)) @ region.rotation
-    return _Region.turned(rotation, points)
+    return _Region.turned(_about(normal, angle) @ region.rotation, points)
 
 
 def _back(world: PlannedWorld, hand: int) -> Program:

@@ -204,6 +204,12 @@ def release(world: PlannedWorld, step: Step) -> Primitive:
     return Outcome() if name not in world.held else Outcome(reason or "not_true_after", "the hand did not open")
 
 
+def put_down_others(world: PlannedWorld, name: str) -> Generator[Program, str, None]:
+    """Puts down what other hands hold than an object, where no hand is free."""
+    for other in [n for n in world.held if n and n != name] if all(world.held) else []:
+        yield from release(world, Step("release", (other,)))
+
+
 def _lowered(world: PlannedWorld, name: str, hand: int) -> Program:
     """The hand goes straight down until what it holds is right above what is below it, or as far as it reaches."""
     obstacles, grip = world.obstacles([name], world.stance), world.grip(hand)
