@@ -5,7 +5,8 @@
 One GPU. Start states of a task's home; the robot's eye, 128 x 128, RGB and depth, once a call, from the same worlds
 each time. Variants are timed in turns, `--rounds` times, next to the ray caster as it is (`base`):
 
-- `refit`, `depth`: parts of `base`: the boxes of what moves alone, and images without colour.
+- `slots`, `poses`, `refit`, `depth`: parts of `base`: which particles are shown; that and where everything is; that
+  and the boxes of what moves; images without colour.
 - `leaf_N`: triangles in a leaf of the trees of merged meshes. `cubql`, `median`: how these trees are built.
 - `block_N`: threads of a block; a tile of 64 rays is one or several of them.
 - `size_N`: images of other sizes. `cameras_N`: the eye and N - 1 of the robot's other cameras.
@@ -38,9 +39,12 @@ from ig2mj.sensors.particle_slots import fill_slots
 from ig2mj.worlds.draw import Draw
 
 VARIANTS = (
-    *("base", "refit", "depth", "leaf_1", "leaf_4", "leaf_8", "cubql", "median"),
+    *("base", "slots", "poses", "refit", "depth", "leaf_1", "leaf_4", "leaf_8", "cubql", "median"),
     *("block_32", "block_128", "block_256", "size_64", "size_224", "cameras_3"),
 )
+
+PARTS = ("slots", "poses", "refit")
+"""Variants that make no image."""
 
 
 @contextlib.contextmanager
@@ -80,14 +84,18 @@ def camera_of(env: Any, variant: str, looks: str) -> BatchCamera:
 
 def program_of(camera: BatchCamera, variant: str, world: Any) -> Callable[[], Any]:
     """One call of the variant, compiled; its arguments stay on the device."""
-    if variant == "refit":
+    if variant in PARTS:
 
-        def refit(physics: Any, view: Any, states: Any) -> Any:
+        def part(physics: Any, view: Any, states: Any) -> Any:
             slots = fill_slots(camera.model, states, view, camera.slots)
+            if variant == "slots":
+                return slots
             moved = camera._moved(physics, slots, {}, None, Draw())
+            if variant == "poses":
+                return moved.geom_xpos, moved.geom_xmat, moved.cam_xpos, moved.cam_xmat
             return jax.vmap(lambda d: mjx.refit_bvh(camera._model, d, camera._handle)._impl._jax_token)(moved)
 
-        act = jax.jit(refit)
+        act = jax.jit(part)
     else:
         act = jax.jit(lambda physics, view, states: (lambda i: (i.rgb, i.depth))(camera(physics, view, states)))
     return lambda: jax.block_until_ready(act(world.physics, world.view, world.states))
@@ -117,7 +125,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     for variant in dict.fromkeys(("base", *args.variants)):
         try:
             program = program_of(camera_of(env, variant, args.looks), variant, world)
-            images[variant] = jax.tree.map(np.asarray, program()) if variant != "refit" else (program(), None)[1]
+            images[variant] = jax.tree.map(np.asarray, program()) if variant not in PARTS else (program(), None)[1]
         except Exception as failure:
             print(f"{variant}: {type(failure).__name__}: {str(failure).splitlines()[0][:200]}", flush=True)
             continue

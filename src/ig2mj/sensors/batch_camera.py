@@ -37,7 +37,7 @@ from ig2mj.looks.visual import visual_owners
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, camera_id, check_request
-from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, mergeable, rigid_parts, tables_of
+from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, mergeable, rigid_parts, robot_geoms, tables_of
 from ig2mj.sensors.particle_slots import Slots, fill_slots
 from ig2mj.sensors.ray_cameras import sectors_of, set_rays, set_rows
 from ig2mj.sensors.render_model import BACKGROUND, make_render_model, mean_colours
@@ -178,7 +178,8 @@ class BatchCamera:
         if self._merged is not None:
             from ig2mj.sensors.ray_caster import use_merged
 
-            use_merged(contexts, self._host, self._merged, self.engine.num_worlds, self._changes)
+            robots = robot_geoms(self._host, self.engine.scene.tables.body_agent)
+            use_merged(contexts, self._host, self._merged, self.engine.num_worlds, robots, self._changes)
         elif not pins.obstacles():
             from ig2mj.sensors.shading import limit_light
 

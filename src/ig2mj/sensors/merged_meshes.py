@@ -4,7 +4,7 @@ MJX-Warp's ray caster has a tree of boxes for each world, with a box for each ge
 mesh asset. A ray that looks across a room enters the boxes of walls, floor, ceiling and most furniture, and looks for a
 triangle in each, in no particular order. Merged meshes have one tree for all of them, which all worlds share.
 
-Axes: V vertices, F triangles, G geoms, N boxes.
+Axes: V vertices, F triangles, G geoms, B bodies of the scene, N boxes.
 """
 
 from __future__ import annotations
@@ -80,6 +80,18 @@ def rigid_parts(
         mocap = int(scene.body_mocapid[scene.body_rootid[body]]) >= 0
         by_body.setdefault(welded if welded or not mocap else body, []).append(int(geom))
     return [_part(host, data, geoms, covered, 0 < body < host.nbody) for body, geoms in sorted(by_body.items())]
+
+
+def robot_geoms(host: mujoco.MjModel, body_agent: Int[np.ndarray, "B"]) -> Bool[np.ndarray, "G"]:
+    """Geoms of a render model that move with a robot: its own, and what it wears.
+
+    Args:
+      body_agent: of the bodies of the scene, which are the first of the render model: the robot that each is of, or -1.
+    """
+    of_bodies = np.zeros(host.nbody, bool)
+    of_bodies[: len(body_agent)] = body_agent >= 0
+    of_bodies |= np.array([host.body(body).name == COSTUMES for body in range(host.nbody)])
+    return of_bodies[host.geom_bodyid]
 
 
 def alpha(model: mujoco.MjModel) -> Float[np.ndarray, "G"]:

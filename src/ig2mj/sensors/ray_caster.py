@@ -21,6 +21,7 @@ from typing import Any, no_type_check
 import mujoco
 import numpy as np
 import warp as wp
+from jaxtyping import Bool
 from mujoco.mjx.third_party.mujoco_warp._src import bvh, ray
 
 from ig2mj.sensors.merged_meshes import MESH, Tables
@@ -32,18 +33,24 @@ PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)
 CONSTRUCTOR, LEAF = "sah", 2
 """How trees of merged meshes are built; they are built once."""
 
+ELSEWHERE = (0.0, 0.0, 100.0)
+"""Metres by which robots are moved while the tree of boxes is made: far from all else."""
+
 
 def use_merged(
     contexts: Sequence[Any],
     host: mujoco.MjModel,
     tables: Tables,
     nworld: int,
+    robots: Bool[np.ndarray, "G"],
     changes: Sequence[tuple[str, str]] = (),
 ) -> None:
     """Lets render contexts cast rays against merged meshes.
 
     Args:
       contexts: of MuJoCo Warp, of cameras of the render model, made with `tables.absorbed` in no group that is seen.
+      robots: geoms that move through the home together. The tree of boxes keeps the shape that it has when it is made,
+        so that they have a branch of their own.
       changes: of the kernel (`limit_light`).
     """
     assert host.nflex == 0, "flexes' arrays carry the tables"
@@ -53,6 +60,7 @@ def use_merged(
 
     data = mujoco.MjData(host)
     mujoco.mj_forward(host, data)
+    data.geom_xpos[robots] += ELSEWHERE
     known = {name: getattr(host, name) for name in dir(host) if name.startswith(("geom_", "flex_"))}
     as_merged = types.SimpleNamespace(**{**known, "geom_dataid": tables.data_id, "ngeom": host.ngeom})
     for context in contexts:
