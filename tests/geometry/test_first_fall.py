@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import jax
 import numpy as np
-import pytest
 from hand_world import HandWorld, Item
 
-from ig2mj.geometry import first_fall
 from ig2mj.geometry.first_fall import FallPieces, Ways, first_met
 from ig2mj.geometry.targets import RayTargets, fall_contact
 
@@ -25,9 +23,7 @@ def _world(count: int) -> HandWorld:
     return HandWorld(*items)
 
 
-@pytest.mark.parametrize("at_once", [(3, 2), (16, 4)], ids=["in turns", "at once"])
-def test_the_first_object_is_the_one_of_least_depth(at_once, monkeypatch):
-    monkeypatch.setattr(first_fall, "AT_ONCE", {"cpu": at_once, "gpu": at_once})
+def test_the_first_object_is_the_one_of_least_depth():
     world = _world(12)
     view, tables = world.view(), world.tables
     start = RNG.uniform(-1.2, 1.2, (1, LINES, 2, 3)).astype(np.float32) + np.array([0, 0, 1.5], np.float32)

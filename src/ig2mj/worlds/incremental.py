@@ -15,8 +15,8 @@ engines, with the states and the view of each control step. Six facts decide wha
   would change anything, `states.update.sources` which heat sources act. Each is called only where a field that it reads
   has changed. While sources act on the same objects, temperatures go on as before.
 - Where the last step changed nothing but temperatures, contents of containers and coats, and ig2mj's own states are
-  idle, one small program (`states.substances.flow_step`) takes the place of the first part. Streams end where they did
-  while nothing moves.
+  idle, one small program (`states.substances.flow_step`) takes the place of the first part. While nothing moves, it
+  computes several steps at a time.
 - A goal is evaluated where something that it reads has changed (`ig2mj.worlds.incremental_goal`).
 - The native engine marks views between which nothing but agents moved (`engine.view.but_agents`). Such a view counts as
   the same, unless the states or the goal read what differs. Fingers count as the same while all are out of reach of all
@@ -38,7 +38,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Shaped
 
 from ig2mj.engine.base import Engine
 from ig2mj.engine.native.execution import HostFunction
@@ -49,7 +49,6 @@ from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
 from ig2mj.states.substances import flow_step
-from ig2mj.states.substances.volume import no_streams
 from ig2mj.states.update import can_be_idle, events, heat, heat_fields, idle, own_idle, queries, sources
 from ig2mj.states.world import ExtendedStates, Swap
 from ig2mj.worlds.incremental_goal import AHEAD, GoalPrograms, IncrementalGoal, TemperatureSteps
@@ -90,7 +89,9 @@ class IncrementalRules:
         self._view: PhysicsView | None = None
         self._fingers_away: bool | None = None  # in `_view`; None: not looked at
         self._flows = False  # the last step changed contents or coats, and else nothing but temperatures
-        self._streams: list[Array] | None = None  # those of the last step, while nothing has moved; None: not known
+        self._flow_ahead: FlowSteps | None = None  # steps of contents, of which `_flow_over` are over
+        self._flow_over = 0
+        self._stands = False  # nothing has moved since the last step
 
     @classmethod
     def of(cls, rules: Rules, engine: Engine) -> IncrementalRules:
@@ -102,17 +103,20 @@ class IncrementalRules:
         last = self._last
         if not self._enabled or last is None or self._acts is None or states is not last.states:
             return self._whole_step(states, jax.tree.leaves(states), view)
+        self._stands = True
         if view is not self._view and not self._is_same(view) and not self._is_idle(view):
             return self._whole_step(states, self._leaves, view)
         flowed: frozenset[str] = frozenset()
         if self._flows:
-            leaves, self._streams, complete, self._flows = self._programs.flow(self._leaves, view, self._streams)
-            if not complete:
+            made = self._flow_step(view)
+            if made is None:
                 return self._whole_step(states, self._leaves, view)
             if self._flows:
-                self._leaves, flowed = leaves, FLOW_FIELDS
+                flowed = FLOW_FIELDS
+                for place, leaf in zip(self._programs.flow_places, made, strict=True):
+                    self._leaves[place] = leaf
                 if self._settled:
-                    states = jax.tree.unflatten(self._programs.structure, leaves)
+                    states = jax.tree.unflatten(self._programs.structure, self._leaves)
                 if not self._programs.heat_takes.isdisjoint(flowed):
                     self._settled, self._ahead = False, None
         if self._settled:
@@ -142,10 +146,22 @@ class IncrementalRules:
         self._last = Outcome(states, None, status)
         return self._last
 
+    def _flow_step(self, view: PhysicsView) -> list[Array] | None:
+        """The leaves that contents and coats are after this step, and notes whether it changes any; None: it is a whole
+        one."""
+        if not self._stands or self._flow_ahead is None or self._flow_over >= self._flow_ahead.steps:
+            steps = flow_step.AHEAD if self._stands else 1
+            self._flow_ahead, self._flow_over = self._programs.flow(self._leaves, view, steps), 0
+        k, ahead = self._flow_over, self._flow_ahead
+        if k >= ahead.complete:
+            return None
+        self._flow_over, self._flows = k + 1, bool(ahead.changes[k])
+        return [steps[k] for steps in ahead.made]
+
     def _whole_step(self, states: ExtendedStates, leaves: list[Array], view: PhysicsView) -> Outcome:
         done = self._programs.step(leaves, view)
         self._view, self._fingers_away, self._ahead, self._leaves = view, None, None, done.leaves
-        self._flows, self._streams = done.flows, None
+        self._flows, self._flow_ahead = done.flows, None
         self._acts, self._settled = done.acts if done.quiet or done.flows else None, done.settled
         after = jax.tree.unflatten(self._programs.structure, done.leaves)
         self._last = Outcome(after, None, self._goal.evaluate(view, done.leaves))
@@ -171,7 +187,7 @@ class IncrementalRules:
         same = _are_equal(view, before, others) and (not fingers or self._are_fingers_away(view))
         if not same and not programs.idle(self._leaves, view, own):
             return False
-        self._streams = None
+        self._stands = False
         acts = programs.acts(self._leaves, view)
         if acts is not self._acts and not np.array_equal(acts, np.asarray(self._acts)):
             self._settled, self._ahead = False, None
@@ -196,6 +212,20 @@ def _are_equal(one: PhysicsView, other: PhysicsView, names: Iterable[str]) -> bo
         if a is not b and not (isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and a.tobytes() == b.tobytes()):
             return False
     return True
+
+
+class FlowSteps(NamedTuple):
+    """Steps of contents and coats, as long as nothing moves.
+
+    Attributes:
+      made: leaves of the states that these are, after each step. steps: how many were asked for. complete: how many are
+        those of a whole step. changes: whether each changes something.
+    """
+
+    made: list[Shaped[Array, "N W ..."]]
+    steps: int
+    complete: int
+    changes: list[int]
 
 
 class _Step(NamedTuple):
@@ -237,10 +267,9 @@ class _StatePrograms:
         self._step, self._heat = HostFunction(self._rules_fn), HostFunction(self._heat_fn)
         self._idle, self._acts = HostFunction(self._idle_fn), HostFunction(self._acts_fn)
         self._own_idle, self._flow = HostFunction(self._own_idle_fn), HostFunction(self._flow_fn)
-        self._flow_places = [place for place, name in enumerate(names) if name in FLOW_FIELDS]
+        self.flow_places = [names.index(name) for name in flow_step.FIELDS] if set(names) >= FLOW_FIELDS else []
         self._names, self._can_flow = names, flow_step.possible(model)
-        self._no_streams: list[Array] = jax.tree.leaves(no_streams(model, num_worlds)) if self._can_flow else []
-        self._with_streams = jax.tree.structure((0, [0] * len(names), [0] * len(self._no_streams), 0))
+        self._with_count = jax.tree.structure((0, [0] * len(names), 0))
         self._none_act = np.zeros((num_worlds, model.tables.num_objects, len(model.parameters.heat_object)), bool)
         self._of_view_and_states = jax.tree.structure((0, [0] * len(names)))
         self._with_acts = jax.tree.structure((0, [0] * len(names), 0))
@@ -281,19 +310,11 @@ class _StatePrograms:
         function = self._own_idle if own else self._idle
         return bool(function.flat([view, *leaves], self._of_view_and_states))
 
-    def flow(
-        self, leaves: list[Array], view: PhysicsView, streams: list[Array] | None
-    ) -> tuple[list[Array], list[Array], bool, bool]:
-        """A step of contents and coats: leaves after it, its streams, whether it is complete, and whether it changes
-        something. `streams`: of the last step, where nothing has moved since."""
-        given = self._no_streams if streams is None else streams
-        made, ended, complete, changes = self._flow.flat(
-            [view, *leaves, *given, np.array(streams is not None)], self._with_streams
-        )
-        leaves = list(leaves)
-        for place, leaf in zip(self._flow_places, made, strict=True):
-            leaves[place] = leaf
-        return leaves, ended, bool(complete), bool(changes)
+    def flow(self, leaves: list[Array], view: PhysicsView, steps: int) -> FlowSteps:
+        """The next steps of contents and coats."""
+        made, flags = self._flow.flat([view, *leaves, np.int32(steps)], self._with_count)
+        count, *changes = flags.tolist()
+        return FlowSteps(made, steps, count, changes)
 
     @functools.cached_property
     def heat_takes(self) -> frozenset[str]:
@@ -328,15 +349,10 @@ class _StatePrograms:
     def _own_idle_fn(self, view: PhysicsView, leaves: list[Array]) -> Array:
         return own_idle(self.model, jax.tree.unflatten(self.structure, leaves), view, self._plan.evaluate(view))
 
-    def _flow_fn(
-        self, view: PhysicsView, leaves: list[Array], streams: list[Array], same: Array
-    ) -> tuple[list[Array], list[Array], Array, Array]:
-        before = jax.tree.unflatten(jax.tree.structure(no_streams(self.model, 1)), streams)
+    def _flow_fn(self, view: PhysicsView, leaves: list[Array], steps: Array) -> tuple[list[Array], Array]:
         states = jax.tree.unflatten(self.structure, leaves)
-        done = flow_step.flowed(self.model, states, view, self._plan.evaluate(view), before, same)
-        made = [jax.tree.leaves(done.states)[place] for place in self._flow_places]
-        changes = jnp.any(jnp.stack([jnp.any(a != leaves[p]) for a, p in zip(made, self._flow_places, strict=True)]))
-        return made, jax.tree.leaves(done.streams), done.complete, changes
+        done = flow_step.flowed(self.model, states, view, self._plan.evaluate(view), jnp.asarray(steps))
+        return done.made, jnp.concatenate([done.count[None], done.changes.astype(jnp.int32)])
 
     def _acts_fn(self, view: PhysicsView, leaves: list[Array]) -> Array:
         return sources(self.model, jax.tree.unflatten(self.structure, leaves), view, self._plan.evaluate(view))

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, UInt32
+from jaxtyping import Bool, Float, Int, UInt32
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_rotate
@@ -47,14 +47,22 @@ def covered(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O U"]:
     return jnp.concatenate([jnp.asarray(states.coat) > 0, none], axis=1)[:, of(model).row]
 
 
-def saturated(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O U"]:
-    """Whether each object has absorbed as much of each substance as it takes to be soaked; of water, whether it is."""
+def saturated(
+    model: StateModel, states: ExtendedStates, objects: Int[np.ndarray, "N"] | None = None
+) -> Bool[Array, "W N U"]:
+    """Whether each object has absorbed as much of each substance as it takes to be soaked; of water, whether it is.
+
+    Args:
+      objects: None: all.
+    """
     found, p = of(model), model.parameters
+    some = np.arange(model.tables.num_objects) if objects is None else objects
     least = np.where(np.isfinite(p.wetness_soaked), p.wetness_soaked, np.where(p.has("cleaningTool"), 1.0, np.inf))
-    none = jnp.zeros((states.absorbed.shape[0], 1, states.absorbed.shape[2]))
-    drops = jnp.concatenate([jnp.asarray(states.absorbed), none], axis=1)[:, found.row]
-    enough = drops >= least.astype(np.float32)[:, None]
-    soaked = wetness.soaked(model, states.wetness)[..., None]
+    row = found.row[some]
+    there = row < len(found.covered)
+    drops = jnp.asarray(states.absorbed)[:, np.where(there, row, 0)] if there.any() else jnp.zeros((1, 1, 1))
+    enough = (drops >= least[some].astype(np.float32)[:, None]) & there[:, None]
+    soaked = wetness.soaked(model, states.wetness)[:, some, None]
     return jnp.where(np.arange(len(found.names)) == found.water, soaked, enough)
 
 
@@ -85,53 +93,43 @@ def spilled(
     model: StateModel,
     states: ExtendedStates,
     amounts: Float[Array, "W K U"],
-    landed: Landed,
+    met: Int[Array, "W K"],
+    points: UInt32[Array, "W K"],
     by_taps: Bool[Array, "W K"],
-    view: PhysicsView,
 ) -> ExtendedStates:
     """The states after streams met objects.
 
     Args:
-      amounts: litres of each stream that met one. by_taps: streams of taps, which do not soak: their drops do.
+      amounts: litres of each stream that met one. met: the objects, -1: none. points: of them that are covered.
+      by_taps: streams of taps, which do not soak: their drops do.
     """
     found, p = of(model), model.parameters
     soakable = np.isfinite(p.wetness_soaked)
     soaking = jnp.where(by_taps[..., None], 0.0, amounts) / DROP
-    met = landed.object[..., None] == np.arange(len(soakable))  # [W, K, O]
-    drops = jnp.sum(jnp.where((met & soakable)[..., None], soaking[:, :, None], 0.0), axis=1)  # [W, O, U]
-    water = drops[..., found.water] if found.water >= 0 else jnp.zeros(drops.shape[:2])
-    if model.paper:
-        wet = states.wetness + water
-    else:
-        wet = jnp.where(
-            water > 0, jnp.maximum(states.wetness, np.where(soakable, p.wetness_soaked, 0.0)), states.wetness
-        )
-    takes = np.append(~p.has("waterSink") & ~soakable, False)  # the last: no object
-    onto = jnp.any(amounts > 0, axis=-1) & jnp.asarray(takes)[landed.object]  # [W, K]
-    coat = jax.lax.cond(
-        jnp.any(onto),
-        lambda: _covered_by(model, states.coat, amounts, landed, onto, view),
-        lambda: jnp.asarray(states.coat),
-    )
+    mine = (met[..., None] == np.arange(len(soakable))) & soakable  # [W, K, O]
+    wet = jnp.asarray(states.wetness)
+    if found.water >= 0:
+        water = jnp.sum(jnp.where(mine, soaking[..., found.water, None], 0.0), axis=1)  # [W, O]
+        soaked = wet + water if model.paper else jnp.maximum(wet, np.where(soakable, p.wetness_soaked, 0.0))
+        wet = jnp.where(water > 0, soaked, wet)
     own = np.arange(len(found.names)) != found.water
-    absorbed = states.absorbed + jnp.where(own, drops[:, found.covered], 0.0)
-    return dataclasses.replace(states, wetness=wet, coat=coat, absorbed=absorbed)
+    drops = jnp.sum(jnp.where(mine[:, :, found.covered, None] & own, soaking[:, :, None], 0.0), axis=1)  # [W, D, U]
+    takes = np.append(~p.has("waterSink") & ~soakable, False)  # the last: no object
+    row = jnp.where(jnp.asarray(takes)[met], jnp.asarray(found.row)[met], len(found.covered))  # [W, K]
+    coat = jnp.asarray(states.coat)
+    for k in range(amounts.shape[1]):
+        onto = (row[:, k, None] == np.arange(len(found.covered)))[..., None] & (amounts[:, k] > 0)[:, None]
+        coat = coat | jnp.where(onto, points[:, k, None, None], np.uint32(0))
+    return dataclasses.replace(states, wetness=wet, coat=coat, absorbed=states.absorbed + drops)
 
 
-def _covered_by(
-    model: StateModel,
-    coat: UInt32[Array, "W D U"],
-    amounts: Float[Array, "W K U"],
-    landed: Landed,
-    onto: Bool[Array, "W K"],
-    view: PhysicsView,
-) -> UInt32[Array, "W D U"]:
+def points_near(model: StateModel, landed: Landed, view: PhysicsView) -> UInt32[Array, "W K"]:
+    """The points that a stream covers of the object that it meets."""
     found = of(model)
     if not len(found.covered):
-        return jnp.asarray(coat)
-    row = jnp.where(onto, jnp.asarray(found.row)[landed.object], len(found.covered))  # [W, K]
-    read = jnp.minimum(row, len(found.covered) - 1)
-    body, at = jnp.asarray(found.body)[read], jnp.asarray(found.pos)[read]  # [W, K, N(, 3)]
+        return jnp.zeros(landed.object.shape, jnp.uint32)
+    row = jnp.minimum(jnp.asarray(found.row)[landed.object], len(found.covered) - 1)  # [W, K]
+    body, at = jnp.asarray(found.body)[row], jnp.asarray(found.pos)[row]  # [W, K, N(, 3)]
     flat = body.reshape(len(body), -1, 1)
     pos, quat = (
         jnp.take_along_axis(jnp.asarray(field), flat, axis=1).reshape(*body.shape, -1)
@@ -139,20 +137,14 @@ def _covered_by(
     )
     offset = pos + quat_rotate(quat, at) - landed.pos[:, :, None]
     distance = jnp.sum(offset * offset, axis=-1)
-    near = (distance <= NEAR**2) | (distance <= jnp.min(distance, axis=-1, keepdims=True))
-    bits = as_bits(near)
-    new = jnp.asarray(coat)
-    for k in range(amounts.shape[1]):
-        mine = (row[:, k, None] == np.arange(len(found.covered)))[..., None] & (amounts[:, k] > 0)[:, None]
-        new = new | jnp.where(mine, bits[:, k, None, None], np.uint32(0))
-    return new
+    return as_bits((distance <= NEAR**2) | (distance <= jnp.min(distance, axis=-1, keepdims=True)))
 
 
 def can_remove(step: EventStep) -> Bool[Array, "W T U"]:
     """Which tool can remove which substance now."""
     model, states = step.model, step.states
     found, tools = of(model), model.parameters.tool_object
-    full = saturated(model, states)[:, tools]  # [W, T, U]
+    full = saturated(model, states, tools)
     by = jnp.any(full[:, :, None] & found.cleaners, axis=-1)
     soaked = wetness.soaked(model, states.wetness)[:, tools]
     able = by | found.dry | (found.wet & soaked[..., None])
@@ -170,12 +162,8 @@ def wipe(step: EventStep) -> EventStep:
     if not len(model.parameters.tool_object) or not len(of(model).covered) or not len(of(model).names):
         return step
 
-    def act() -> dict[str, Array]:
-        meeting = _meeting(step)
-        return jax.lax.cond(jnp.any(meeting), lambda: _wiped(step, meeting), lambda: _fields(step.states))
-
-    some = jnp.any(jnp.asarray(step.states.coat) > 0)
-    return step.having(**jax.lax.cond(some, act, lambda: _fields(step.states)))
+    meeting = _meeting(step)
+    return step.having(**jax.lax.cond(jnp.any(meeting), lambda: _wiped(step, meeting), lambda: _fields(step.states)))
 
 
 def _fields(states: ExtendedStates) -> dict[str, Array]:
@@ -208,8 +196,7 @@ def wipes_nothing(step: EventStep) -> Bool[Array, ""]:
     """No tool meets what it can remove."""
     if not len(step.model.parameters.tool_object) or not len(of(step.model).covered):
         return jnp.array(True)
-    some = jnp.any(jnp.asarray(step.states.coat) > 0)
-    return ~jax.lax.cond(some, lambda: jnp.any(_meeting(step)), lambda: jnp.array(False))
+    return ~jnp.any(_meeting(step))
 
 
 def set_covered(model: StateModel, states: ExtendedStates, obj: int, name: str, value: bool) -> ExtendedStates:

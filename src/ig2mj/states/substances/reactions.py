@@ -104,7 +104,8 @@ def _in_containers(step: EventStep, table: Reactions, there: Bool[Array, "W C X"
     complete &= things.can_make(jnp.asarray(step.states.absent), own)[:, None]
     warm = jnp.asarray(step.states.warm)[:, found.row[found.containers.object], : len(table.rules)]
     able = complete & warm & (~table.stir | _stirred(step, table)[..., None])
-    first = able & (jnp.cumsum(able, axis=-1) == 1)
+    number = np.arange(len(table.rules))
+    first = number == jnp.min(jnp.where(able, number, len(number)), axis=-1, keepdims=True)
     for kind in range(len(own.kinds)):
         mine = first & (own.makes == kind)
         before = jnp.cumsum(jnp.any(mine, axis=-1), axis=-1)[..., None]

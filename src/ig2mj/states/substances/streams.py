@@ -9,10 +9,8 @@ Axes: W worlds, K streams, S = 3 pieces of the way, C containers, O objects, R c
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -21,7 +19,6 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.first_fall import FallPieces, Ways, first_met
 from ig2mj.geometry.poses import quat_rotate_inverse
 from ig2mj.scene.tables import SceneTables
-from ig2mj.states.relations.worklist import Worklist
 from ig2mj.states.substances.containers import Containers, Openings
 
 MOST = 4
@@ -47,10 +44,6 @@ UPWARDS = 0.3
 
 SLACK = 0.005
 """m by which an opening may lie below an object's surface and still be met first: the edge of its own rim."""
-
-WORLDS_AT_ONCE = (256, 4096)
-"""Worlds whose streams are followed together, of those in which something flows: the first number while there are no
-more, else the second."""
 
 
 class Falling(NamedTuple):
@@ -79,40 +72,6 @@ class Landed(NamedTuple):
     pos: Float[Array, "W K 3"]
 
 
-def land(tables: SceneTables, containers: Containers, falling: Falling) -> Landed:
-    """Follows the streams of all worlds."""
-    num_worlds = falling.active.shape[0]
-    nothing = jnp.full(falling.active.shape, -1, jnp.int32)
-    nowhere = Landed(jnp.zeros(falling.source.shape, bool), nothing, falling.start)
-    flowing = jnp.any(falling.active, axis=1)
-    if num_worlds <= WORLDS_AT_ONCE[0]:
-        return jax.lax.cond(jnp.any(flowing), lambda: _followed(tables, containers, falling), lambda: nowhere)
-    few, many = (_in_turns(tables, containers, falling, nowhere, min(n, num_worlds)) for n in WORLDS_AT_ONCE)
-    return jax.lax.cond(jnp.sum(flowing) <= WORLDS_AT_ONCE[0], few, many)
-
-
-def _in_turns(
-    tables: SceneTables, containers: Containers, falling: Falling, nowhere: Landed, at_once: int
-) -> Callable[[], Landed]:
-    """Follows streams of so many worlds at a time."""
-    flowing = jnp.any(falling.active, axis=1)
-    num_worlds = len(flowing)
-
-    def act() -> Landed:
-        listed = Worklist.of(flowing, at_once)
-
-        def some(turn: Int[jax.Array, ""], done: Landed) -> Landed:
-            worlds = listed.places(turn * at_once)  # beyond the last: `num_worlds`, which reads any and writes none
-            own = jax.tree.map(lambda a: jnp.asarray(a)[jnp.minimum(worlds, num_worlds - 1)], falling)
-            found = _followed(tables, containers, own)
-            return jax.tree.map(lambda a, b: a.at[worlds].set(b, mode="drop"), done, found)
-
-        turns = (jnp.sum(flowing) + at_once - 1) // at_once
-        return jax.lax.fori_loop(0, turns, some, jax.tree.map(jnp.asarray, nowhere))
-
-    return act
-
-
 def falling_from(
     active: Bool[Array, "W K"],
     start: Float[Array, "W K 3"],
@@ -128,7 +87,8 @@ def falling_from(
     )
 
 
-def _followed(tables: SceneTables, containers: Containers, falling: Falling) -> Landed:
+def land(tables: SceneTables, containers: Containers, falling: Falling) -> Landed:
+    """Follows the streams of all worlds."""
     depths = np.array([GRAVITY / 2 * t * t for t in TIMES] + [FALL], np.float32)
     middles = np.array([0.5 * (a + b) for a, b in zip(TIMES, (*TIMES[1:], TIMES[-1]), strict=True)], np.float32)
     out = (LIP + SPEED * middles)[:, None] * falling.aside[:, :, None, :]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt32
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.model import StateModel
@@ -61,24 +61,41 @@ def filled(model: StateModel, volume: Float[Array, "W C U"]) -> Bool[Array, "W C
     return volume > FILLED * of(model).containers.litres[:, None]
 
 
-def outflow(
-    model: StateModel,
-    volume: Float[Array, "W C U"],
-    stock: Bool[Array, "W C U"],
-    solid: Bool[Array, "W C U"],
-    view: PhysicsView,
-) -> tuple[Float[Array, "W C U"], Float[Array, "W C U"]]:
-    """Litres that leave each container in this step, and those that its sources give besides."""
-    containers, dt = of(model).containers, model.options.timestep
-    free = jnp.where(solid, 0.0, volume)
+class Standing(NamedTuple):
+    """How containers stand: litres that stay in each, and whether its opening points down."""
+
+    holds: Float[Array, "W C"]
+    down: Bool[Array, "W C"]
+
+
+def standing(model: StateModel, view: PhysicsView) -> Standing:
+    """How containers stand in a view."""
+    containers = of(model).containers
+    return Standing(containers.holds(view), containers.openings(view).normal[..., 2] < 0.0)
+
+
+def outflow(model: StateModel, states: ExtendedStates, volume: Float[Array, "W C U"], stand: Standing) -> Outflow:
+    """What leaves each container in this step.
+
+    Args:
+      volume: what is in it, litres.
+    """
+    dt = model.options.timestep
+    free = jnp.where(states.solid, 0.0, volume)
     available = jnp.sum(free, axis=-1)
-    excess = jnp.sum(volume, axis=-1) - containers.holds(view)
+    excess = jnp.sum(volume, axis=-1) - stand.holds
     wanted = jnp.maximum(excess * (dt / OUTFLOW_TIME), jnp.minimum(excess, LEAST_OUTFLOW))
     leaving = jnp.clip(wanted, 0.0, available)
     share = free / jnp.maximum(available, 1e-12)[..., None]
     left = jnp.minimum(share * leaving[..., None], volume)
-    down = containers.openings(view).normal[..., 2] < 0.0
-    return left, (stock & ~solid & down[..., None]) * np.float32(SOURCE_RATE * dt)
+    return Outflow(left, (states.stock & ~states.solid & stand.down[..., None]) * np.float32(SOURCE_RATE * dt))
+
+
+class Outflow(NamedTuple):
+    """Litres that leave each container in a step, and those that its sources give besides."""
+
+    left: Float[Array, "W C U"]
+    given: Float[Array, "W C U"]
 
 
 def taps(model: StateModel, toggled_on: Bool[Array, "W O"]) -> Float[Array, "W T U"]:
@@ -102,57 +119,69 @@ def drained(model: StateModel, volume: Float[Array, "W C U"]) -> Float[Array, "W
     return jnp.minimum(volume / jnp.maximum(total, 1e-12)[..., None] * leaving[..., None], volume)
 
 
-class Streams(NamedTuple):
-    """Which outlets had streams in a step, and where these ended."""
+class Outlets(NamedTuple):
+    """What flows in a step, before it is known where to.
 
+    Attributes:
+      volume: of containers after they drained. gone: what drains took. flow: of containers, and from_taps: of taps, all
+        of them. chosen: outlet of each stream.
+    """
+
+    volume: Float[Array, "W C U"]
+    gone: Float[Array, "W C U"]
+    flow: Outflow
+    from_taps: Float[Array, "W T U"]
     chosen: Bool[Array, "W K E"]
+
+
+class Streams(NamedTuple):
+    """Where the streams of chosen outlets end, and which points of the objects that they meet they cover."""
+
     landed: Landed
+    points: UInt32[Array, "W K"]
 
 
 def update(step: EventStep) -> EventStep:
     """One control step of all volumes."""
-    return flow(step)[0]
+    if not has_outlets(step.model):
+        return step
+    out = outlets(step, standing(step.model, step.view))
+    return poured(step, out, streams(step, out.chosen))
 
 
-def flow(
-    step: EventStep, before: Streams | None = None, same: Bool[Array, ""] | bool = False
-) -> tuple[EventStep, Streams | None]:
-    """One control step of all volumes, and its streams; None where the scene has no outlets.
-
-    Args:
-      before: those of another step. same: nothing has moved since that step, so that the streams of the same outlets
-        end where they did.
-    """
-    model, states, view = step.model, step.states, step.view
-    found = of(model)
-    containers = found.containers
-    if not has_outlets(model):
-        return step, None
+def outlets(step: EventStep, stand: Standing) -> Outlets:
+    """What flows in this step."""
+    model, states = step.model, step.states
     gone = drained(model, states.volume)
     volume = states.volume - gone
-    left, given = outflow(model, volume, states.stock, states.solid, view)
-    from_taps = taps(model, states.toggled_on)
+    flow, from_taps = outflow(model, states, volume, stand), taps(model, states.toggled_on)
+    flowing = jnp.concatenate([jnp.any(sum(flow) > 0, axis=-1), jnp.any(from_taps > 0, axis=-1)], axis=1)  # [W, E]
+    before = np.tri(flowing.shape[1], k=-1, dtype=bool)
+    turn = jnp.sum(flowing[:, None] & before, axis=-1)
+    chosen = flowing[:, None] & (turn[:, None] == np.arange(MOST)[:, None])
+    return Outlets(volume, gone, flow, from_taps, chosen)
+
+
+def poured(step: EventStep, out: Outlets, ends: Streams) -> EventStep:
+    """The step after contents flowed where their streams end. `ends`: of the chosen outlets."""
+    model, states = step.model, step.states
+    count = len(of(model).containers.body)
+    flows = jnp.any(out.chosen, axis=1)[..., None]
+    left, given = (jnp.where(flows[:, :count], x, 0.0) for x in out.flow)
+    from_taps = jnp.where(flows[:, count:], out.from_taps, 0.0)
     amounts = jnp.concatenate([left + given, from_taps], axis=1)  # [W, E, U]
-    flowing = jnp.any(amounts > 0, axis=-1)
-    turn = jnp.cumsum(flowing, axis=1) - 1
-    chosen = flowing[:, None] & (turn[:, None] == np.arange(MOST)[:, None])  # [W, K, E]
-    flows = jnp.any(chosen, axis=1)[..., None]
-    count = len(containers.body)
-    left, given, from_taps = (jnp.where(flows[:, a:b], x, 0.0) for a, b, x in
-                              ((0, count, left), (0, count, given), (count, None, from_taps)))  # fmt: skip
-    amounts = jnp.sum(jnp.where(chosen[..., None], amounts[:, None], 0.0), axis=2)  # [W, K, U]
-    landed = _landed(model, chosen, view, before, same)
-    into = jnp.sum(jnp.where(landed.container[..., None], amounts[:, :, None], 0.0), axis=1)
-    outside = jnp.where(jnp.any(landed.container, axis=-1)[..., None], 0.0, amounts)
+    amounts = jnp.sum(jnp.where(out.chosen[..., None], amounts[:, None], 0.0), axis=2)  # [W, K, U]
+    into = jnp.sum(jnp.where(ends.landed.container[..., None], amounts[:, :, None], 0.0), axis=1)
+    outside = jnp.where(jnp.any(ends.landed.container, axis=-1)[..., None], 0.0, amounts)
     states = dataclasses.replace(
         states,
-        volume=jnp.maximum(volume - left, 0.0) + into,
-        lost=states.lost + jnp.sum(gone, axis=1) + jnp.sum(outside, axis=1),
+        volume=jnp.maximum(out.volume - left, 0.0) + into,
+        lost=states.lost + jnp.sum(out.gone, axis=1) + jnp.sum(outside, axis=1),
         drawn=states.drawn + jnp.sum(given, axis=1) + jnp.sum(from_taps, axis=1),
     )
-    by_taps = jnp.any(chosen[:, :, count:], axis=-1)  # their drops soak (`ig2mj.states.definitions.water`)
-    step = dataclasses.replace(step, states=coat.spilled(model, states, outside, landed, by_taps, view))
-    return step, Streams(chosen, landed)
+    by_taps = jnp.any(out.chosen[:, :, count:], axis=-1)  # their drops soak (`ig2mj.states.definitions.water`)
+    states = coat.spilled(model, states, outside, ends.landed.object, ends.points, by_taps)
+    return dataclasses.replace(step, states=states)
 
 
 def has_outlets(model: StateModel) -> bool:
@@ -160,30 +189,13 @@ def has_outlets(model: StateModel) -> bool:
     return bool(len(of(model).containers.body) or len(model.parameters.water_object))
 
 
-def no_streams(model: StateModel, worlds: int) -> Streams:
-    """Streams of a step in which nothing flows. NumPy arrays."""
-    containers, outlets = len(of(model).containers.body), len(of(model).containers.body) + len(_tap_links(model))
-    return Streams(
-        np.zeros((worlds, MOST, outlets), bool),
-        Landed(
-            np.zeros((worlds, MOST, containers), bool),
-            np.full((worlds, MOST), -1, np.int32),
-            np.zeros((worlds, MOST, 3), np.float32),
-        ),
-    )
-
-
-def _landed(
-    model: StateModel,
-    chosen: Bool[Array, "W K E"],
-    view: PhysicsView,
-    before: Streams | None,
-    same: Bool[Array, ""] | bool,
-) -> Landed:
+def streams(step: EventStep, chosen: Bool[Array, "W K E"]) -> Streams:
     """Where the streams of the chosen outlets end."""
+    model, view = step.model, step.view
     containers = of(model).containers
+    worlds, most = chosen.shape[:2]
 
-    def follow() -> Landed:
+    def follow() -> Streams:
         start, aside = _beginnings(model, view)
         falling = falling_from(
             jnp.any(chosen, axis=-1),
@@ -194,12 +206,15 @@ def _landed(
             containers.openings(view),
             view,
         )
-        return land(model.tables, containers, falling)
+        landed = land(model.tables, containers, falling)
+        return Streams(landed, coat.points_near(model, landed, view))
 
-    if before is None:
-        return follow()
-    known = same & jnp.all(before.chosen == chosen)
-    return jax.lax.cond(known, lambda: jax.tree.map(jnp.asarray, before.landed), follow)
+    def none() -> Streams:
+        container = jnp.zeros((worlds, most, len(containers.body)), bool)
+        nothing = jnp.full((worlds, most), -1, jnp.int32)
+        return Streams(Landed(container, nothing, jnp.zeros((worlds, most, 3))), jnp.zeros((worlds, most), jnp.uint32))
+
+    return jax.lax.cond(jnp.any(chosen), follow, none)
 
 
 def _beginnings(model: StateModel, view: PhysicsView) -> tuple[Float[Array, "W E 3"], Float[Array, "W E 2"]]:
@@ -223,8 +238,8 @@ def _origins(model: StateModel, chosen: Bool[Array, "W K E"]) -> Int[Array, "W K
 def idle(step: EventStep) -> Bool[Array, ""]:
     """Nothing flows, and nothing drains."""
     model, states = step.model, step.states
-    left, given = outflow(model, states.volume, states.stock, states.solid, step.view)
-    moving = jnp.any(left > 0) | jnp.any(given > 0) | jnp.any(drained(model, states.volume) > 0)
+    flow = outflow(model, states, states.volume, standing(model, step.view))
+    moving = jnp.any(sum(flow) > 0) | jnp.any(drained(model, states.volume) > 0)
     return ~moving & ~jnp.any(taps(model, states.toggled_on) > 0)
 
 
