@@ -50,7 +50,7 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
 from ig2mj.states.substances import flow_step
 from ig2mj.states.update import can_be_idle, events, heat, heat_fields, idle, own_idle, queries, sources
-from ig2mj.states.world import ExtendedStates, Swap
+from ig2mj.states.world import ExtendedStates, Swap, with_fields
 from ig2mj.worlds.incremental_goal import AHEAD, GoalPrograms, IncrementalGoal, TemperatureSteps
 from ig2mj.worlds.rules import Outcome, Rules
 
@@ -107,16 +107,17 @@ class IncrementalRules:
         if view is not self._view and not self._is_same(view) and not self._is_idle(view):
             return self._whole_step(states, self._leaves, view)
         flowed: frozenset[str] = frozenset()
+        new: dict[str, Array] = {}
         if self._flows:
             made = self._flow_step(view)
             if made is None:
                 return self._whole_step(states, self._leaves, view)
             if self._flows:
                 flowed = FLOW_FIELDS
-                for place, leaf in zip(self._programs.flow_places, made, strict=True):
-                    self._leaves[place] = leaf
+                for name, place, leaf in zip(flow_step.FIELDS, self._programs.flow_places, made, strict=True):
+                    self._leaves[place] = new[name] = leaf
                 if self._settled:
-                    states = jax.tree.unflatten(self._programs.structure, self._leaves)
+                    states = with_fields(states, new)
                 if not self._programs.heat_takes.isdisjoint(flowed):
                     self._settled, self._ahead = False, None
         if self._settled:
@@ -131,12 +132,14 @@ class IncrementalRules:
                 self._ahead, self._ahead_over = self._programs.heat(self._leaves, self._acts, view), 0
             ahead, k = self._ahead, self._ahead_over
             self._ahead_over += 1
-            made, same = ahead.step(k)
+            same = ahead.same[k]
             self._settled = all(same)
-            for place, leaf in zip(self._programs.heat_places, made, strict=True):
-                self._leaves[place] = leaf
-            states = jax.tree.unflatten(self._programs.structure, self._leaves)
-            changed = [n for n, is_same in zip(self._programs.heat_names, same, strict=True) if not is_same]
+            changed = list[str]()
+            for name, place, steps, is_same in zip(*self._programs.of_heat, ahead.made, same, strict=True):
+                if not is_same:
+                    changed.append(name)
+                    self._leaves[place] = new[name] = steps[:, k]
+            states = self._programs.changed(states, new, self._leaves)
             if not self._programs.late_reads.isdisjoint(changed):
                 self._acts = None  # the next step is a whole one
             if flowed:
@@ -250,16 +253,21 @@ class _StatePrograms:
 
     Attributes:
       structure: of the states, as a pytree. heat_places, heat_names: of the leaves that the second part changes, their
-        places among the states' and the names of their fields. fingers_matter: also where they are out of reach of
-        buttons. tells_idle: `idle` is of use. late_reads: fields that the second part changes and the first reads.
+        places among the states' and the names of their fields. of_heat: both. flow_places: places of
+        `flow_step.FIELDS`. fingers_matter: also where they are out of reach of buttons. tells_idle: `idle` is of use.
+        late_reads: fields that the second part changes and the first reads.
     """
 
     def __init__(self, model: StateModel, num_worlds: int):
         self.model, self._plan = model, RelationPlan.build(model, queries(model))
         named, self.structure = jax.tree_util.tree_flatten_with_path(initial_states(model, num_worlds))
         names = [path[0].name for path, _ in named]
-        self.heat_places = [place for place, name in enumerate(names) if name in heat_fields(model)]
+        self.heat_places = [
+            place for place, name in enumerate(names) if name in heat_fields(model) and named[place][1].size
+        ]
         self.heat_names = [names[place] for place in self.heat_places]
+        self.of_heat = self.heat_names, self.heat_places
+        self._are_arrays = all(len(named[place][0]) == 1 for place in self.heat_places)
         self.fingers_matter = FINGERS in AddedUpdates.of(model).reads
         added = AddedUpdates.of(model)
         self.late_reads = added.late
@@ -315,6 +323,10 @@ class _StatePrograms:
         made, flags = self._flow.flat([view, *leaves, np.int32(steps)], self._with_count)
         count, *changes = flags.tolist()
         return FlowSteps(made, steps, count, changes)
+
+    def changed(self, states: ExtendedStates, fields: dict[str, Array], leaves: list[Array]) -> ExtendedStates:
+        """The states with new values of some fields. `leaves`: all of them."""
+        return with_fields(states, fields) if self._are_arrays else jax.tree.unflatten(self.structure, leaves)
 
     @functools.cached_property
     def heat_takes(self) -> frozenset[str]:

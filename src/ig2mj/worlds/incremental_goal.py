@@ -50,10 +50,6 @@ class TemperatureSteps(NamedTuple):
     made: list[Shaped[Array, "W N ..."]]
     same: list[list[bool]]
 
-    def step(self, k: int) -> tuple[list[Array], list[bool]]:
-        """The leaves after step k, and whether it left each as it was."""
-        return [steps[:, k] for steps in self.made], self.same[k]
-
 
 class IncrementalGoal:
     """The status of a goal in one batch of worlds, evaluated where something that it reads has changed."""
@@ -124,7 +120,7 @@ class GoalPrograms:
             named, self._structure = jax.tree_util.tree_flatten_with_path(initial_states(goal.model, num_worlds))
             names, late = [path[0].name for path, _ in named], heat_fields(goal.model)
             self._names = names
-            self._heat_places = [place for place, name in enumerate(names) if name in late]
+            self._heat_places = [place for place, name in enumerate(names) if name in late and named[place][1].size]
             self._heat_names = [names[place] for place in self._heat_places]
             self._arguments = jax.tree.structure((0, [0] * len(names), [0] * len(self._heat_places), 0))
             starts = [np.asarray(named[place][1]) for place in self._heat_places]

@@ -32,6 +32,11 @@ def _machines(model: StateModel, categories: Sequence[str]) -> Int[np.ndarray, "
     return np.flatnonzero([category in categories for category in model.tables.object_categories])
 
 
+def has_machines(model: StateModel) -> bool:
+    """Whether a scene has any."""
+    return any(len(_machines(model, categories)) for categories, _ in KINDS)
+
+
 def _running(step: EventStep, machines: Int[np.ndarray, "M"]) -> Bool[Array, "W M"]:
     """Which machines run."""
     has_switch = step.model.parameters.has("toggleable")[machines]
@@ -66,9 +71,7 @@ def _washed(step: EventStep, inside: Bool[Array, "W M O"]) -> dict[str, Any]:
         "wetness": jnp.where(washed, jnp.maximum(wet, soaked.astype(np.float32)), wet),
     }
     for dirt in (DUST, STAIN):
-        rows = getattr(states, dirt.name)
-        alive = jnp.asarray(rows.alive) & ~washed[:, dirt.rows(model), None]
-        new[dirt.name] = dataclasses.replace(rows, alive=alive)
+        new[dirt.name] = jnp.asarray(getattr(states, dirt.name).alive) & ~washed[:, dirt.rows(model), None]
     return new
 
 
@@ -93,16 +96,18 @@ def update(step: EventStep) -> EventStep:
     for categories, act in KINDS:
         machines = _machines(step.model, categories)
         if len(machines):
-            step = _after(step, machines, act)
+            step = _having(step, act(step, _inside(step, machines, _running(step, machines))))
     return step
 
 
-def _after(step: EventStep, machines: Int[np.ndarray, "M"], act: Any) -> EventStep:
-    runs = _running(step, machines)
-    names = act(step, jnp.zeros((*runs.shape, step.model.tables.num_objects), bool))
-    kept = jax.tree.map(jnp.asarray, {name: getattr(step.states, name) for name in names})
-    done = jax.lax.cond(jnp.any(runs), lambda: act(step, _inside(step, machines, runs)), lambda: kept)
-    return step.having(**done)
+def _having(step: EventStep, made: dict[str, Any]) -> EventStep:
+    """The step with what machines made: fields of states, and of dust and stains the particles that are left."""
+    particles = {
+        dirt.name: dataclasses.replace(getattr(step.states, dirt.name), alive=made[dirt.name])
+        for dirt in (DUST, STAIN)
+        if dirt.name in made
+    }
+    return step.having(**{**made, **particles})
 
 
 def rests(step: EventStep) -> Bool[Array, ""]:
@@ -135,6 +140,7 @@ def _any_changes(
 def _changes(step: EventStep, machines: Int[np.ndarray, "M"], runs: Bool[Array, "W M"], act: Any) -> Bool[Array, ""]:
     """Whether machines that run change some state."""
     made = act(step, _inside(step, machines, runs))
-    pairs = [(jax.tree.leaves(new), jax.tree.leaves(getattr(step.states, n))) for n, new in made.items()]
-    differ = [jnp.any(a != jnp.asarray(b)) for news, olds in pairs for a, b in zip(news, olds, strict=True)]
-    return jnp.any(jnp.stack(differ))
+    before = {
+        n: getattr(step.states, n).alive if n in (DUST.name, STAIN.name) else getattr(step.states, n) for n in made
+    }
+    return jnp.any(jnp.stack([jnp.any(made[n] != jnp.asarray(before[n])) for n in made]))
