@@ -146,10 +146,11 @@ def first_met(
     """The first object in the way of each point; of equals the one with the least number. A point that is in a piece
     meets it at once."""
     found = FirstMet(jnp.full(ways.active.shape, -1, jnp.int32), jnp.full(ways.active.shape, jnp.inf))
-    axes, pos = quat_to_matrix(jnp.asarray(body_quat)), jnp.asarray(body_pos)
     for pieces in groups:
-        turn = [[axes[:, None, pieces.body, i, j] for j in range(3)] for i in range(3)]  # [W, 1, E] each
-        at = [pos[:, None, pieces.body, i] for i in range(3)]
+        axes = quat_to_matrix(jnp.asarray(body_quat)[:, pieces.body])[:, None]
+        pos = jnp.asarray(body_pos)[:, pieces.body][:, None]
+        turn = [[axes[..., i, j] for j in range(3)] for i in range(3)]  # [W, 1, E] each
+        at = [pos[..., i] for i in range(3)]
         found = _nearer(found, _first_of(pieces, turn, at, ways))
     return found
 

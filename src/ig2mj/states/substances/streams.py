@@ -133,6 +133,8 @@ def _openings_met(
     corners = containers.rim - containers.centre[:, None]  # [C, R, 3]
     edges = np.roll(corners, -1, axis=1) - corners
     outwards = np.cross(edges, np.broadcast_to(containers.normal[:, None], edges.shape))
-    beyond = jnp.einsum("wkscx,crx->wkscr", local, outwards) - np.sum(corners * outwards, axis=-1)
-    inside = jnp.all(beyond <= 1e-9, axis=-1) & crosses & ~falling.source[:, :, None]
+    limit = np.sum(corners * outwards, axis=-1) + 1e-9
+    inside = crosses & ~falling.source[:, :, None]
+    for corner in range(outwards.shape[1]):  # a few products each: no product of matrices
+        inside &= sum(local[..., i] * outwards[:, corner, i] for i in range(3)) <= limit[:, corner]
     return jnp.min(jnp.where(inside, below + depths[:-1, None], jnp.inf), axis=2)
