@@ -193,7 +193,8 @@ def _into_boxes(slabs: Float[np.ndarray, "E 3 5"], turn: list, at: list, ways: W
 
 
 def _into_polyhedra(planes: Float[np.ndarray, "N 4 E"], turn: list, at: list, ways: Ways) -> Float[jax.Array, "W K E"]:
-    low, high = ([np.float32(bound)] * len(ways.above) for bound in (-np.inf, np.inf))
+    low: list[AnyArray] = [np.full(1, -np.inf, np.float32)] * len(ways.above)
+    high: list[AnyArray] = [np.full(1, np.inf, np.float32)] * len(ways.above)
     offsets = [[ways.start[:, :, line, i, None] - at[i] for i in range(3)] for line in range(len(ways.above))]
     for plane in planes:
         normal = [sum(turn[i][j] * plane[j] for j in range(3)) for i in range(3)]
@@ -207,7 +208,7 @@ def _into_polyhedra(planes: Float[np.ndarray, "N 4 E"], turn: list, at: list, wa
 
 def _least(low: Sequence, high: Sequence, ways: Ways) -> Float[jax.Array, "W K E"]:
     """Depths of points whose lines are in the pieces from `low` to `high`, by line."""
-    depth: AnyArray = np.float32(np.inf)  # type: ignore[assignment]
+    depth: AnyArray = np.full(1, np.inf, np.float32)
     for line, above in enumerate(ways.above):
         meets = (low[line] <= high[line]) & (low[line] <= ways.length[:, :, line, None]) & (high[line] >= 0.0)
         depth = jnp.minimum(depth, jnp.where(meets, jnp.maximum(low[line], 0.0) + above, jnp.inf))

@@ -6,6 +6,7 @@ Axes: W worlds, O objects, N = `AHEAD` steps.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -35,7 +36,7 @@ class Flowed(NamedTuple):
         something.
     """
 
-    made: list[Shaped[Array, "N W ..."]]
+    made: Sequence[Shaped[Array, "N W ..."]]
     count: Int[Array, ""]
     changes: Bool[Array, "N"]
 
