@@ -364,7 +364,7 @@ class _StatePrograms:
     def _flow_fn(self, view: PhysicsView, leaves: list[Array], steps: Array) -> tuple[list[Array], Array]:
         states = jax.tree.unflatten(self.structure, leaves)
         done = flow_step.flowed(self.model, states, view, self._plan.evaluate(view), jnp.asarray(steps))
-        return done.made, jnp.concatenate([done.count[None], done.changes.astype(jnp.int32)])
+        return list(done.made), jnp.concatenate([done.count[None], done.changes.astype(jnp.int32)])
 
     def _acts_fn(self, view: PhysicsView, leaves: list[Array]) -> Array:
         return sources(self.model, jax.tree.unflatten(self.structure, leaves), view, self._plan.evaluate(view))
