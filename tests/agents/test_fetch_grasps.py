@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from robot_world import GraspingWorld, can
@@ -31,7 +33,8 @@ def test_fetch_holds_what_its_closing_fingers_touch_and_carries_it(tiny_home_fol
     robots, core = world.simulation.robots, world.simulation.core
     action = np.zeros((1, 11), np.float32)
     action[0, -1] = -1.0
-    ctrl, robots.controllers = core.controls.act(action, world.view, robots.controllers)
+    ctrl, controllers = core.controls.act(action, world.view, robots.controllers)
+    world.simulation.batch = dataclasses.replace(world.simulation.batch, controllers=controllers)
     for _ in range(15):
         before = can(world)
         world.simulation.step(np.asarray(ctrl)[0])

@@ -7,7 +7,7 @@ import pytest
 from navigating import column, drive, small
 
 import ig2mj
-from ig2mj.errors import UnknownNameError
+from ig2mj.errors import EngineError
 from ig2mj.testing import api_test
 
 ROWS = 8
@@ -80,5 +80,5 @@ def test_starts_belong_to_their_split(point):
     others = ig2mj.make(point.task, worlds=4, pool_size=ROWS, split="held_out")
     seen = [np.asarray(env.reset(0).batch.world.view.agent.base_pos) for env in (point, others)]
     assert not np.allclose(*seen)
-    with pytest.raises(UnknownNameError, match="turtlebot, fetch"):
+    with pytest.raises(EngineError, match="turtlebot, fetch can"):
         ig2mj.make(point.task, robot="humanoid")

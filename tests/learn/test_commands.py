@@ -112,6 +112,7 @@ def test_processes_join_before_jax_looks_for_devices(monkeypatch, capsys):
 @pytest.mark.timeout(900)
 def test_a_training_leaves_reports_checkpoints_a_policy_and_films(tmp_path, capsys):
     """A film of a held-out episode while it trains, and one at its end; a second run with the folder is refused."""
+    pytest.importorskip("imageio_ffmpeg", reason="makes the films")
     run = tmp_path / "run"
     settings = ["--worlds", "2", *POOL, "--engine", "native", "--out", str(run), "--set", "updates=1", "batch=32"]
     assert call(["train", "GraspingBook", "--minutes", "0.2", "--videos", "0.1", *settings]) == 0

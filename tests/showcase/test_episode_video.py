@@ -19,6 +19,7 @@ from ig2mj.viewer.video import ffmpeg_program
 def test_a_film_shows_one_episode_and_its_end(tmp_path):
     import subprocess
 
+    pytest.importorskip("imageio_ffmpeg", reason="makes the video")
     env = ig2mj.make("GraspingBook", engine="native", split="held_out", pool_size=4).with_horizon(2)
     video = EpisodeVideo(tmp_path / "book.mp4", env)
     played = play(env, lambda state: np.zeros((1, 6), np.float32), 2, watch=video.see)

@@ -52,6 +52,24 @@ def test_an_orthographic_free_view_is_to_scale(scene, backend):
     assert seen[0, 0] == -1
 
 
+def test_numbers_of_geoms_are_not_blended_where_they_meet(scene, monkeypatch):
+    """Multisampling gives numbers of other geoms, or of none, on OpenGL that heeds it in any pass."""
+    if offscreen.default_backend() == "warp":
+        pytest.skip("no OpenGL works on this machine")
+    samples = []
+    real = mujoco.Renderer
+
+    def renderer(model, *arguments, **named):
+        samples.append(int(model.vis.quality.offsamples))
+        return real(model, *arguments, **named)
+
+    offscreen.close()
+    monkeypatch.setattr(mujoco, "Renderer", renderer)
+    for segmentation in (True, False):
+        offscreen.render(*scene, ABOVE, width=32, height=32, segmentation=segmentation)
+    assert samples == [0, 4] and scene[0].vis.quality.offsamples == 4
+
+
 def test_colours_and_shape_of_the_picture(scene, backend):
     image = offscreen.render(*scene, "above", width=64, height=48, backend=backend)
     assert image.dtype == np.uint8 and image.shape == (48, 64, 3)

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.planning.bodies import HandedBody, HoveringBody
+from ig2mj.planning.driving import NEAR
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor, Point
 from ig2mj.planning.moves import Primitive, Program, free_hand
 from ig2mj.planning.occupancy import door_objects
@@ -30,9 +31,6 @@ SWINGS, SWING, MOVED = 14, 0.3, 0.03
 WIDE = 0.9
 """Share of its range from which on a door between rooms counts as wide open."""
 
-NEAR = 0.6
-"""m from what a step is about that a robot without hands wants to come."""
-
 BESIDE = 0.6
 """m between a way and the middle of a door's leaf that it leads through, at most."""
 
@@ -44,14 +42,15 @@ def through_doors(world: PlannedWorld, step: Step, action: Callable[[PlannedWorl
         door = door_in_the_way(world, step) if outcome.reason in ("no_base", "no_path") else None
         if door is None:
             return outcome
-        if detail := (yield from _swing(world, door, step)):
+        if (detail := (yield from _swing(world, door, step))) is not None:
             return dataclasses.replace(outcome, reason="no_path", detail=f"{door} is shut in the way{detail}")
         outcome = yield from action(world, step)
     return outcome
 
 
-def _swing(world: PlannedWorld, door: str, step: Step) -> Generator[Program, str, str]:
-    """Opens a door by short swings, each from a new stance, until it is in the way no longer; why it is, in words."""
+def _swing(world: PlannedWorld, door: str, step: Step) -> Generator[Program, str, str | None]:
+    """Opens a door by short swings, each from a new stance, until it is in the way no longer. None, or why it still is,
+    in words; "" for a robot that opens no doors."""
     if not isinstance(world.body, HoveringBody):
         return ""
     if all(world.held):
@@ -66,7 +65,7 @@ def _swing(world: PlannedWorld, door: str, step: Step) -> Generator[Program, str
         now = {j.name: j.fraction for j in joints_of(world, door)}[shut[0].name]
         tried = 0 if now - before > MOVED else tried + attempt % 2
         if door_in_the_way(world, step) != door:
-            return ""
+            return None
     return ", and no hand can move it"
 
 

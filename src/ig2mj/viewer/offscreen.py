@@ -153,13 +153,13 @@ def _resolve_camera(model: mujoco.MjModel, camera: int | str | FreeView | None) 
 
 # ---------------------------------------------------------------------------------------------------- OpenGL
 
-_renderers: collections.OrderedDict[tuple[int, int, int], mujoco.Renderer] = collections.OrderedDict()
+_renderers: collections.OrderedDict[tuple[int, int, int, bool], mujoco.Renderer] = collections.OrderedDict()
 _MAX_RENDERERS = 3  # each holds its model's meshes and textures on the GL side
 
 
 def _render_gl(model, data, view, width, height, groups, segmentation, backend, decorate) -> np.ndarray:
     use_gl(backend)
-    renderer = _renderer_for(model, width, height)
+    renderer = _renderer_for(model, width, height, segmentation)
     option = mujoco.MjvOption()
     option.geomgroup[:] = [g in groups for g in range(len(option.geomgroup))]
     option.sitegroup[:] = 0
@@ -192,22 +192,26 @@ def _render_gl(model, data, view, width, height, groups, segmentation, backend, 
     return image.copy()
 
 
-def _renderer_for(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
-    key = (id(model), width, height)
+def _renderer_for(model: mujoco.MjModel, width: int, height: int, segmentation: bool) -> mujoco.Renderer:
+    """A renderer of a model and size; for segmentation without multisampling, which blends numbers of geoms where they
+    meet into numbers of others, or of none: MuJoCo ends with an IndexError then."""
+    key = (id(model), width, height, segmentation)
     known = _renderers.get(key)
     if known is not None and known.model is model:
         _renderers.move_to_end(key)
         return known
     while len(_renderers) >= _MAX_RENDERERS:
         _free(_renderers.popitem(last=False)[1])
-    size = model.vis.global_
-    keep = (size.offwidth, size.offheight)
+    size, quality = model.vis.global_, model.vis.quality
+    keep, samples = (size.offwidth, size.offheight), quality.offsamples
+    quality.offsamples = 0 if segmentation else samples
     size.offwidth, size.offheight = max(width, keep[0]), max(height, keep[1])
     try:
         with images_of(width, height):
             renderer = mujoco.Renderer(model, height, width, max_geom=2 * model.ngeom + model.nsite + 1000)
     finally:
         size.offwidth, size.offheight = keep
+        quality.offsamples = samples
     _renderers[key] = renderer
     _close_at_exit()
     return renderer
