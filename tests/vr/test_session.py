@@ -16,10 +16,10 @@ from websockets.sync.client import connect
 
 from ig2mj.agents.humanoid.frames import HAND_POS, HAND_QUAT
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.vr import server
 from ig2mj.vr.frames import Hand, PlayArea, Pose, PoseFrame
 from ig2mj.vr.page_source import PagePoses
 from ig2mj.vr.play_area import brought_to
-from ig2mj.vr import server
 from ig2mj.vr.server import HomePage
 from ig2mj.vr.session import Session, person_environment
 from ig2mj.web.access import access_for
