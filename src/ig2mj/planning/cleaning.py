@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import collections
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
-from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.planning.cleaning_area import cleaning_area, is_covered
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp, put_down_others
@@ -22,6 +22,7 @@ from ig2mj.planning.handing_over import hand_over
 from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_path, hand_with, strayed, travel, vector3
 from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase
+from ig2mj.planning.placing import bring_out
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
@@ -64,11 +65,11 @@ TRIES = 4
 ELSEWHERE = 0.12
 """m between stances from which an object is cleaned."""
 
+BESIDE, MOVED = 0.12, 4
+"""m from dirt within which things are moved away where no tool reaches it, and how many at most."""
+
 REGRASPS = 8
 """Times that a tool which was lost is taken again."""
-
-COVERED = 0.5
-"""Cosine of the angle between where the hand is and where the cleaning area faces, above which the hand covers it."""
 
 
 def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
@@ -84,7 +85,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             yield from toggle(True)(world, Step("toggle_on", (tool,)))
         reason, detail, lost, tried = "no_base", f"no dirt of {name} is in reach", 0, collections.Counter[int]()
         visited: list[Stance] = []
-        opened = Tried()
+        opened, moved = Tried(), set[str]()
         for attempt in range(ROUNDS):
             if not world.facts.holds(predicate, name):
                 break
@@ -94,7 +95,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 if again is None or not again.done:
                     return Outcome("slipped", f"the hand lost {tool}", attempts=attempt + 1)
             hand = hand_with(world, tool)
-            if _is_covered(world, tool, hand):
+            if is_covered(world, tool, hand):
                 yield from put_down_others(world, tool)
                 if failed := (yield from hand_over(world, tool, hand)):
                     reason, detail = failed, f"{tool} cannot be taken by the side that does not clean"
@@ -105,6 +106,8 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             plan = _plan(world, tool, hand, spots, visited)
             while plan is None and (yield from open_around(world, name, opened)):
                 plan = _plan(world, tool, hand, spots, visited)
+            while plan is None and (yield from _clear_away(world, name, tool, spots, moved)) and tool in world.held:
+                plan = _plan(world, tool, hand, spots, ())
             if plan is None:
                 break
             if strayed(world, hand):
@@ -135,6 +138,31 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
         return Outcome(reason or "not_true_after", detail)
 
     return clean
+
+
+def _clear_away(
+    world: PlannedWorld, name: str, tool: str, spots: Sequence[DirtSpot], moved: set[str]
+) -> Generator[Program, str, bool]:
+    """Puts what stands next to dirt, the nearest first, onto open floor; returns whether there was something that has
+    not been moved."""
+    if not spots or len(moved) >= MOVED:
+        return False
+    points = np.array([s.pos + CLOSE * s.normal for s in spots])
+    near = list[tuple[float, str]]()
+    for other in world.domain.loose:
+        if other in (name, tool, *world.held) or other in moved or not world.domain.graspable(other):
+            continue
+        low, high = world.facts.box(other)
+        apart = np.linalg.norm(points - np.clip(points, low, high), axis=1).min()
+        if apart < BESIDE:
+            near.append((float(apart), other))
+    if not near:
+        return False
+    other = min(near)[1]
+    moved.add(other)
+    yield from put_down_others(world, tool)
+    yield from bring_out(world, other)
+    return True
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -172,7 +200,7 @@ def _regions(world: PlannedWorld, tool: str, hand: int, yaw: float, normal: Vect
     """Turns of a tool with its box, for a robot that looks along `yaw`, rad: with its cleaning area towards the face;
     as it is carried; of a hand that floats, turned about the normal and tilted, too, and close to the face, where there
     is less room. A tilted tool cleans in a larger box."""
-    area, out = _area(world, tool)
+    area, out = cleaning_area(world, tool)
     points = (world.vertices(tool) if area is None else area) - world.grip(hand)
     carried = about_vertical(yaw - world.base[1])
     facing = carried if area is None else turn_onto(carried @ out, -normal) @ carried
@@ -194,29 +222,6 @@ def _about(axis: Vector, angle: float) -> Rotation:
     x, y, z = axis
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + s * k + (1 - c) * (k @ k)
-
-
-def _area(world: PlannedWorld, tool: str) -> tuple[Float[np.ndarray, "8 3"] | None, Vector]:
-    """Corners of a tool's cleaning area, and the direction out of the tool that it faces: along its thinnest side, away
-    from the middle; no corners, where the whole tool cleans."""
-    p, tables = world.domain.model.parameters, world.domain.model.tables
-    number = np.flatnonzero(p.tool_object == world.index(tool))
-    link = int(p.tool_link[number[0]]) if len(number) else -1
-    if link < 0 or not (tables.link_half[link] > 0).any():
-        return None, UP
-    half = tables.link_half[link]
-    frame = matrices_on_host(np.asarray(world.view.link_quat)[world.world, [link]])[0]
-    middle = np.asarray(world.view.link_pos)[world.world, link].astype(float)
-    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-    axis, corners = frame[:, int(np.argmin(half))], world.vertices(tool)
-    away = (middle - (corners.min(0) + corners.max(0)) / 2) @ axis
-    return middle + (signs * half) @ frame.T, axis * (1.0 if away >= 0 else -1.0)
-
-
-def _is_covered(world: PlannedWorld, tool: str, hand: int) -> bool:
-    """Whether the hand is on the side of a tool that cleans."""
-    area, out = _area(world, tool)
-    return area is not None and float(world.hand_axes(hand)[1] @ out) < -COVERED
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -375,7 +380,7 @@ def _program(world: PlannedWorld, tool: str, hand: int, stroke: _Stroke) -> Prog
 
 def _turned(world: PlannedWorld, tool: str, hand: int, region: _Region, normal: Vector, angle: float) -> _Region:
     """The same tool turned about the normal of a face, rad."""
-    area, _ = _area(world, tool)
+    area, _ = cleaning_area(world, tool)
     points = (world.vertices(tool) if area is None else area) - world.grip(hand)
     return _Region.turned(_about(normal, angle) @ region.rotation, points)
 

@@ -7,20 +7,15 @@ import itertools
 from collections.abc import Callable, Generator
 
 import numpy as np
-from jaxtyping import Float
 
 from ig2mj.planning.bodies import HandedBody, HoveringBody
+from ig2mj.planning.clutter import moved_out_of_the_way, nearest_floor, target_of
 from ig2mj.planning.driving import NEAR
-from ig2mj.planning.free_floor import NEAR_START, FreeFloor, Point
 from ig2mj.planning.moves import Primitive, Program, free_hand
 from ig2mj.planning.occupancy import door_objects
 from ig2mj.planning.opening import joints_of, move_joint
-from ig2mj.planning.stances import behind_wall
 from ig2mj.planning.steps import Step
 from ig2mj.planning.world import PlannedWorld
-
-LOOKED_AT = 60
-"""Places near what a step is about from which it is looked whether a wall is in between, about."""
 
 MOST_DOORS = 6
 """Doors that are opened for one primitive."""
@@ -41,7 +36,10 @@ def through_doors(world: PlannedWorld, step: Step, action: Callable[[PlannedWorl
     for _ in range(MOST_DOORS):
         door = door_in_the_way(world, step) if outcome.reason in ("no_base", "no_path") else None
         if door is None:
-            return outcome
+            if outcome.reason != "no_base" or not (yield from moved_out_of_the_way(world, step)):
+                return outcome
+            outcome = yield from action(world, step)
+            continue
         if (detail := (yield from _swing(world, door, step))) is not None:
             return dataclasses.replace(outcome, reason="no_path", detail=f"{door} is shut in the way{detail}")
         outcome = yield from action(world, step)
@@ -73,17 +71,22 @@ def door_in_the_way(world: PlannedWorld, step: Step) -> str | None:
     """The first shut door without which the robot could come near what a step is about; None: there is none."""
     names = world.domain.model.tables.object_names
     doors = [int(d) for d in door_objects(world.domain.model.tables) if not _is_wide(world, names[d])]
-    point = _target(world, step) if doors else None
+    point = target_of(world, step) if doors else None
     if point is None:
         return None
     here, _ = world.base
     floor, reach = world.floor(), world.body.reach if isinstance(world.body, HandedBody) else NEAR
-    if _nearest(world, floor, point, reach) is not None:
+    if nearest_floor(world, floor, point, reach) is not None:
         return None
     held = [world.index(n) for n in world.held if n and not world.domain.fixed(n)]
     freed = world.planner.floor(world.view, without=[*held, *doors], world=world.world)
-    goal = _nearest(world, freed, point, reach)
+    goal = nearest_floor(world, freed, point, reach)
     way = None if goal is None else freed.way(here, goal)
+    if way is None:  # what lies behind the door may be pushed by it
+        loose = [world.index(n) for n in world.domain.loose]
+        freed = world.planner.floor(world.view, without=[*held, *doors, *loose], world=world.world)
+        goal = nearest_floor(world, freed, point, reach)
+        way = None if goal is None else freed.way(here, goal)
     if way is None:
         return None
     lines = [(a, b, max(2, int(np.linalg.norm(b - a) / 0.05))) for a, b in itertools.pairwise(way)]
@@ -97,30 +100,5 @@ def door_in_the_way(world: PlannedWorld, step: Step) -> str | None:
     return min(passed)[1] if passed else None
 
 
-def _nearest(world: PlannedWorld, floor: FreeFloor, point: Float[np.ndarray, "3"], reach: float) -> Point | None:
-    """Floor to which the robot can drive, within reach of a point and on the same side of all walls, the nearest along
-    the floor."""
-    here, _ = world.base
-    cells = floor.within(point[:2], reach)
-    away = floor.distances(here, NEAR_START)[tuple(cells.T)]
-    middles, obstacles = floor.occupancy.middles(cells), world.obstacles()
-    for k in np.argsort(away)[:: max(1, len(away) // LOOKED_AT)]:
-        if not np.isfinite(away[k]):
-            return None
-        if not behind_wall(world, obstacles, middles[k], point):
-            return middles[k]
-    return None
-
-
 def _is_wide(world: PlannedWorld, door: str) -> bool:
     return all(j.fraction >= WIDE for j in joints_of(world, door))
-
-
-def _target(world: PlannedWorld, step: Step) -> Float[np.ndarray, "3"] | None:
-    """What a step is about: what it acts on, or where what is held goes; None: where the robot is, or anywhere."""
-    names = world.domain.model.tables.object_names
-    tables = world.domain.model.tables
-    for name in step.arguments:
-        if name in names and name not in world.held and not tables.object_is_floor[world.index(name)]:
-            return world.com(name)
-    return None

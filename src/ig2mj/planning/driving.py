@@ -69,13 +69,20 @@ def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     start = _backed(world, Stance((float(here[0]), float(here[1])), yaw), standing, turning)
     end = _backed(world, stance, standing, turning)
     way = None if start is None or end is None else turning.way(start.xy, end.xy)
-    if way is None:  # what is held may touch something on the way
-        way = standing.way(here, stance.xy)
-        return "no_path" if way is None else (yield [*drive(way, stance.yaw), *last])
+    if way is None:  # what is held may touch something where the way turns
+        way = world.floor(holding=True, ahead=True).way(here, stance.xy)
+        way = standing.way(here, stance.xy) if way is None else way
+        return "no_path" if way is None else (yield [*_keeping(world, drive(way, stance.yaw)), *last])
     assert start is not None and end is not None
     program = [] if start.xy == (here[0], here[1]) else [shift(start)]
     program += drive(way, stance.yaw)
-    return (yield [*program, *([] if end.xy == stance.xy else [shift(stance)]), *last])
+    return (yield [*_keeping(world, [*program, *([] if end.xy == stance.xy else [shift(stance)])]), *last])
+
+
+def _keeping(world: PlannedWorld, program: Program) -> Program:
+    """The same, which ends where a hand loses what it holds: two hands are looked at in turns."""
+    held = [world.index(n) for n in dict.fromkeys(world.held) if n and not world.domain.fixed(n)]
+    return [dataclasses.replace(p, keeps=held[k % len(held)]) for k, p in enumerate(program)]
 
 
 def stretch(rise: float) -> Phase:

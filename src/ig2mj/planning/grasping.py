@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 
 import numpy as np
 
+from ig2mj.planning.cleaning_area import leaves_free
 from ig2mj.planning.clearance import straight
 from ig2mj.planning.driving import go
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
@@ -59,7 +60,7 @@ NEAREST = 200
 
 def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Primitive:
     """The hand goes onto a side of the object that has room for it, until it holds it; of sides that `prefers` finds
-    better by at least `CLEARLY`, these first.
+    better by at least `CLEARLY`, these first; None: those that leave the side of a tool free that cleans.
     """
     name = step.object
     if name in world.held:
@@ -67,14 +68,21 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
     if not is_graspable(world, name):
         return Outcome("no_grasp", f"{name} is fixed, or its category allows no assisted grasp")
     reason, detail, tried, moved = "no_grasp", "", list[GraspPose](), Tried()
+    nowhere = 0
     for attempt in range(ATTEMPTS):
+        if nowhere and nowhere >= world.held.count(""):  # no hand finds a way
+            break
         hand = free_hand(world, attempt)
+        if prefers is None and name in world.domain.tools:
+            prefers = functools.partial(_leaves_free, world, name)
         found = _plan(world, name, hand, tried, prefers)
         while found is None and (yield from open_around(world, name, moved)):
             found = _plan(world, name, hand, tried, prefers)
         if found is None:
             reason, detail = "no_base", f"no free floor from which a hand has a way to {name}"
+            nowhere += 1
             continue
+        nowhere = 0
         (stance, pose), before = found, world.com(name)
         if reason := (yield from go(world, stance)):
             detail = f"no way leads to where a hand reaches {name}"
@@ -87,6 +95,10 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         if name in world.held:
             return Outcome(attempts=attempt + 1)
     return Outcome(reason or "no_grasp", detail, attempts=ATTEMPTS)
+
+
+def _leaves_free(world: PlannedWorld, name: str, pose: GraspPose) -> float:
+    return float(leaves_free(world, name, pose))
 
 
 def is_graspable(world: PlannedWorld, name: str) -> bool:

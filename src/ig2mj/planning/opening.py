@@ -57,6 +57,9 @@ UPRIGHT = 0.5
 WIDE, TRIES = 0.5, 2
 """Share of a joint's range from which on it is not in the way of a hand, and times that it is moved out of the way."""
 
+HANDS = 2
+"""Hands with which each joint is tried where there is no floor to move it from."""
+
 STANCES, WAYS = 20, 12
 """Stances for each grip, and ways of a hand that are looked for with one kind of grip, at most."""
 
@@ -66,7 +69,7 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
 
     def set_open(world: PlannedWorld, step: Step) -> Primitive:
         name, reason, detail = step.object, "no_grasp", ""
-        passed = dict[str, int]()
+        passed, nowhere = dict[str, int](), 0
         for attempt in range(2 * ATTEMPTS):
             if world.facts.holds("open", name) == value:
                 return Outcome(attempts=max(attempt, 1))
@@ -76,6 +79,9 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             joint = min(joints, key=lambda j: passed.get(j.name, 0))  # of equals the first: the largest link
             tried = passed.get(joint.name, 0)
             reason, detail = yield from move_joint(world, joint, free_hand(world, tried), value, tried)
+            nowhere = nowhere + 1 if reason == "no_base" else 0
+            if nowhere == HANDS * len(joints):
+                break
             now = {j.name: j.fraction for j in joints_of(world, name)}
             passed[joint.name] = tried + (abs(now[joint.name] - joint.fraction) < MOVED)
         if world.facts.holds("open", name) == value:

@@ -82,7 +82,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             found, also = yield from _find(world, predicate, step, hand, opened)
             if isinstance(found, str):
                 reason, detail = _lacking(found), f"{found} {predicate}({name}, {where}) would be true"
-                if found == _NO_WAY and not turned_over and (yield from _regrasp(world, name, hand)):
+                if found == _NO_WAY and not turned_over and (yield from regrasp(world, name, hand)):
                     turned_over = True
                     continue
                 break
@@ -175,7 +175,7 @@ class _Remembered:
             yield spot
 
 
-def _regrasp(world: PlannedWorld, name: str, hand: int) -> Generator[Program, str, bool]:
+def regrasp(world: PlannedWorld, name: str, hand: int) -> Generator[Program, str, bool]:
     """Puts down what a hand holds, and takes it by its rim, as far as possible from where the hand had it."""
     pos, quat = world.pose(name)
     before = matrices_on_host(quat[None])[0].T @ (world.grip(hand) - pos)

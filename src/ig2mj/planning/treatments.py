@@ -28,6 +28,7 @@ from ig2mj.planning.moves import (
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.placing import regrasp
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import AWAY, PlannedWorld, Rotation, Stance, Vector
@@ -196,10 +197,13 @@ def soak(world: PlannedWorld, step: Step) -> Primitive:
     tables = world.domain.model.tables
     links = np.flatnonzero((tables.link_object == world.index(tap)) & (tables.link_kind == LinkKind.WATER_SOURCE))
     source = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
-    reason, number, failed = "", -1, set[int]()
+    reason, number, failed, again = "", -1, set[int](), False
     for _ in range(SOAKS):
-        left = lambda: [h for h in _holds_below(world, name, hand, source) if h.number not in failed]  # noqa: E731
+        left = lambda hand=hand: [h for h in _holds_below(world, name, hand, source) if h.number not in failed]  # noqa: E731
         reason, way, number = yield from _hold_at(world, name, hand, left)
+        if number < 0 and not again and (yield from regrasp(world, name, hand)):  # by another side
+            again, hand = True, hand_with(world, name)
+            continue
         if number < 0:
             return Outcome(reason, f"the hand has no way with {name} below {tap}")
         reason = reason or (yield from _wait(world, "soaked", name, SOAKING, world.index(name)))

@@ -33,6 +33,9 @@ HELD_POINTS, HELD_MARGIN, LATTICE = 60, 0.012, 0.04
 BODY_SPARE = 0.04
 """m that are left between the body and what it carries."""
 
+WIDE = 0.25
+"""m, half the diagonal of what a floating hand carries, from which on it is carried in front of the body's middle."""
+
 TUCKED = (0.5, 0.85, 0.22)
 """m: heights of floating hands whose fingers point up, and how far from the body's axis they reach."""
 
@@ -222,11 +225,12 @@ class PlannedWorld:
         frame = frame if rotation is None else rotation @ frame
         return self.body.axes(hand, frame)
 
-    def floor(self, holding: bool = False, reaching: bool = False) -> FreeFloor:
+    def floor(self, holding: bool = False, reaching: bool = False, ahead: bool = False) -> FreeFloor:
         """Where the robot can stand, without regard to what it holds.
 
         Args:
           holding: in any direction with what it holds. reaching: empty hands are where they rest, not tucked.
+          ahead: with `holding`: only how far that reaches to the sides counts, as on a straight way ahead.
         """
         view, number, hands = self.view, self.world, self.body.hands
         held = [n if n and not self.domain.fixed(n) else "" for n in self.held]
@@ -235,13 +239,15 @@ class PlannedWorld:
         footprint = BaseFootprint.of_robot(self.stage.scene, view, self.stage.agent, number, counts, arm)
         if counts and not all(held) and self.body.resting is not None:
             footprint = footprint.holding(*(self.body.resting if reaching else TUCKED))
-        here, _ = self.base
+        here, yaw = self.base
+        aside = np.array([-np.sin(yaw), np.cos(yaw)])
         for hand, name in enumerate(held):
             if holding and name:
                 corners = np.concatenate(
                     [self.vertices(name), self.body.hand_spheres(*self.hand_axes(hand))[:, :3] + self.grip(hand)]
                 )
-                away = float(np.linalg.norm(corners[:, :2] - here, axis=1).max())
+                offset = corners[:, :2] - here
+                away = float((np.abs(offset @ aside) if ahead else np.linalg.norm(offset, axis=1)).max())
                 footprint = footprint.holding(float(corners[:, 2].min()), float(corners[:, 2].max()), away)
         return self.planner.floor(view, footprint, without=[self.index(n) for n in held if n], world=number)
 
@@ -254,7 +260,9 @@ class PlannedWorld:
         x, y, z = self.body.carry[hand]
         if name := name or self.held[hand]:
             low, high = self.vertices(name).min(0), self.vertices(name).max(0)
-            x = max(x, self.body.trunk[0] + BODY_SPARE + float(np.linalg.norm((high - low)[:2])) / 2)
+            half = float(np.linalg.norm((high - low)[:2])) / 2
+            x = max(x, self.body.trunk[0] + BODY_SPARE + half)
+            y = 0.0 if half > WIDE and self.body.opening is None else y  # the middle of the way through a door
         return np.array([x, y, z])
 
     def from_body(self, point: Vector) -> Vector:
