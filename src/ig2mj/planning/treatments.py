@@ -273,13 +273,14 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
         reason, way, _ = yield from _hold_at(world, knife, hand, holds)
         if reason:
             continue
-        blade = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
-        pressed = vector3(top + CUT_DEPTH * DOWN - blade + world.grip(hand))
-        keeps = world.index(knife)
-        reason = yield [
-            Phase(hand=hand, pos=pressed, keeps=keeps, tolerance=0.01, limit=25, after="", speed=0.04),
-            *travel(hand, way[::-1], None),
-        ]
+        keeps, before = world.index(knife), world.grip(hand)
+        for depth in np.arange(CUT_ABOVE - CUT_STEP, -CUT_DEPTH - CUT_STEP / 2, -CUT_STEP):  # no farther than the cut
+            blade = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
+            pressed = vector3(top + depth * UP - blade + world.grip(hand))
+            reason = yield [Phase(hand=hand, pos=pressed, keeps=keeps, tolerance=0.01, limit=3, after="", speed=0.04)]
+            if reason or world.facts.holds("sliced", name):
+                break
+        reason = reason or (yield travel(hand, [before, *way[-2::-1]], None))
         detail = f"the blade did not press hard enough on {name}"
     yield [carry(world, hand)]
     if world.facts.holds("sliced", name):
@@ -287,5 +288,5 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
     return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
 
-CUT_ABOVE, CUT_DEPTH = 0.08, 0.04
-"""m above what is cut at which the blade comes to it, and below its top that it goes for."""
+CUT_ABOVE, CUT_DEPTH, CUT_STEP = 0.08, 0.04, 0.02
+"""m above what is cut at which the blade comes to it, below its top that it goes for, and between looks at it."""
