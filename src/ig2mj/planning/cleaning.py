@@ -56,6 +56,9 @@ OVER_TOP = 1.0
 NEAREST, STANCES, FEW = 8, 4, 4
 """Particles that stances are looked for, stances for each, and strokes of each of which one has to have a way."""
 
+FAR = 0.6
+"""m beyond a hand's reach from which on particles are not looked at."""
+
 ENOUGH, OVERS = 6, 3
 """Particles that are enough for a stance, and turns of a tool in which ways over a rim are looked for."""
 
@@ -254,7 +257,9 @@ def _plan(
     away = world.away(world.spheres(*world.hand_axes(hand), holding=tool, hand=hand))
     best: _CleanPlan | None = None
     seen = [*visited]
-    for aim in spots[:NEAREST]:
+    looked = 0
+    for aim in spots:
+        known = len(seen)
         for stance in stances(world, hand, aim.pos + PRESSED * aim.normal, floor, away, STANCES):
             if any(np.linalg.norm(np.subtract(stance.xy, v.xy)) < ELSEWHERE for v in seen):
                 continue
@@ -264,6 +269,9 @@ def _plan(
                 best = plan
             if best is not None and len(best.covered) >= ENOUGH:
                 return best
+        looked += len(seen) > known
+        if looked == NEAREST:
+            break
     return best
 
 
@@ -280,6 +288,8 @@ class _From:
     def plan(self, spots: Sequence[DirtSpot]) -> _CleanPlan | None:
         """Places of the tool that cover most particles in reach, each next to the one before; None: the hand has a way
         to none of the first ones."""
+        far = self._world.body.reach + FAR
+        spots = [s for s in spots if np.linalg.norm(s.pos[:2] - self._stance.xy) < far]
         near = [(s, turn) for s in spots if (turn := self._turn(s)) >= 0]
         left, strokes = [s for s, _ in near], list[_Stroke]()
         turns = {s.number: turn for s, turn in near}
