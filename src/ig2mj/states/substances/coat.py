@@ -35,6 +35,9 @@ DROP = 4.19e-3
 NEAR = 0.08
 """m around the place where a stream meets an object: points that it covers. Where none is so near, the nearest is."""
 
+BRUSHES = ("paintbrush",)
+"""Categories of objects that absorb a drop, and give it to what they touch (`ig2mj.states.substances.applying`)."""
+
 ALL = np.uint32((1 << NUM_POINTS) - 1)
 """Every point."""
 
@@ -47,23 +50,36 @@ def covered(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O U"]:
     return jnp.concatenate([jnp.asarray(states.coat) > 0, none], axis=1)[:, of(model).row]
 
 
+def saturation(model: StateModel) -> Float[np.ndarray, "O"]:
+    """Drops of a substance that saturate each object; inf: it absorbs none."""
+    p = model.parameters
+    brush = np.array([category in BRUSHES for category in model.tables.object_categories], bool)
+    tool = np.where(p.has("cleaningTool") | brush, 1.0, np.inf)
+    return np.where(np.isfinite(p.wetness_soaked), p.wetness_soaked, tool)
+
+
+def absorbed_drops(model: StateModel, states: ExtendedStates, objects: Int[np.ndarray, "N"]) -> Float[Array, "W N U"]:
+    """Drops that objects have absorbed; of water their wetness."""
+    found = of(model)
+    row = found.row[objects]
+    there = row < len(found.covered)
+    absorbed = jnp.asarray(states.absorbed)
+    drops = absorbed[:, np.where(there, row, 0)] if there.any() else jnp.zeros((1, 1, 1))
+    drops = jnp.where(there[:, None], drops, 0.0)
+    wet = jnp.asarray(states.wetness)[:, objects, None]
+    return jnp.where(np.arange(len(found.names)) == found.water, wet, drops)
+
+
 def saturated(
     model: StateModel, states: ExtendedStates, objects: Int[np.ndarray, "N"] | None = None
 ) -> Bool[Array, "W N U"]:
-    """Whether each object has absorbed as much of each substance as it takes to be soaked; of water, whether it is.
+    """Whether each object has absorbed as much of each substance as it takes to be soaked.
 
     Args:
       objects: None: all.
     """
-    found, p = of(model), model.parameters
     some = np.arange(model.tables.num_objects) if objects is None else objects
-    least = np.where(np.isfinite(p.wetness_soaked), p.wetness_soaked, np.where(p.has("cleaningTool"), 1.0, np.inf))
-    row = found.row[some]
-    there = row < len(found.covered)
-    drops = jnp.asarray(states.absorbed)[:, np.where(there, row, 0)] if there.any() else jnp.zeros((1, 1, 1))
-    enough = (drops >= least[some].astype(np.float32)[:, None]) & there[:, None]
-    soaked = wetness.soaked(model, states.wetness)[:, some, None]
-    return jnp.where(np.arange(len(found.names)) == found.water, soaked, enough)
+    return absorbed_drops(model, states, some) >= saturation(model)[some].astype(np.float32)[:, None]
 
 
 def positions(model: StateModel, view: PhysicsView) -> Float[Array, "W D N 3"]:

@@ -17,7 +17,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.relations import Relations
 from ig2mj.states.spec import EventStep
-from ig2mj.states.substances import coat, reactions, volume, washing
+from ig2mj.states.substances import applying, coat, reactions, volume, washing
 from ig2mj.states.world import ExtendedStates
 
 FIELDS = ("volume", "lost", "drawn", "coat", "absorbed")
@@ -67,6 +67,8 @@ def flowed(
     stand = volume.standing(model, view)
     first = volume.outlets(start, stand)
     ends = volume.streams(start, first.chosen)
+    applies = applying.exist(model)
+    there = applying.dipped(start) if applies else None
     others = jnp.all(jnp.stack([washing.rests(start), *(spec.idle(start) for spec in _others(model) if spec.idle)]))
 
     def more(now: tuple) -> Bool[Array, ""]:
@@ -78,7 +80,10 @@ def flowed(
         step = start.having(**dict(zip(FIELDS, before, strict=True)))
         out = volume.outlets(step, stand)
         complete = others & jnp.all(out.chosen == first.chosen)
-        step = reactions.update(coat.wipe(volume.poured(step, out, ends)))
+        step = volume.poured(step, out, ends)
+        if there is not None:
+            complete &= applying.rests(applying.applied(step, there))
+        step = reactions.update(coat.wipe(step))
         complete &= ~jnp.any(step.swap.mask) & jnp.all(step.states.wetness == states.wetness)
         if len(model.substances.things.object):  # pyright: ignore[reportOptionalMemberAccess]
             complete &= jnp.all(step.states.absent == states.absent) & jnp.all(step.states.hatched == states.hatched)

@@ -12,23 +12,28 @@ from ig2mj.engine.view import Array
 from ig2mj.states.definitions.dust import DUST
 from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.spec import EventStep, StateSpec
-from ig2mj.states.substances import coat, reactions, solid, things, volume, washing
+from ig2mj.states.substances import applying, coat, reactions, solid, things, volume, washing
 
 if TYPE_CHECKING:
     from ig2mj.states.world import ExtendedStates
 
 
 def _cleaned(step: EventStep) -> EventStep:
-    """The step after tools wiped and machines washed. On a GPU the host waits for each question whether something is
-    to be done: it is asked once."""
-    if not washing.has_machines(step.model):
+    """The step after appliers acted, tools wiped and machines washed. On a GPU the host waits for each question whether
+    something is to be done: it is asked once."""
+    model = step.model
+    applies = applying.exist(model)
+    if not applies and not washing.has_machines(model):
         return coat.wipe(step)
+    made = applying.applied(step, applying.dipped(step)) if applies else None
+    acts = ~(coat.wipes_nothing(step) & washing.rests(step))
+    if made is not None:
+        acts |= ~applying.rests(made)
 
     def act() -> tuple[list[Array], list[Array]]:
-        states = washing.update(coat.wipe(step)).states
-        return _changing(states)
+        before = step if made is None else applying.update(step, made)
+        return _changing(washing.update(coat.wipe(before)).states)
 
-    acts = ~(coat.wipes_nothing(step) & washing.rests(step))
     fields, alive = jax.lax.cond(acts, act, lambda: _changing(step.states))
     particles = [
         dataclasses.replace(getattr(step.states, kind.name), alive=a) for kind, a in zip(DIRT, alive, strict=True)
@@ -43,15 +48,22 @@ def _changing(states: ExtendedStates) -> tuple[list[Array], list[Array]]:
     )
 
 
-CLEANED, DIRT = ("coat", "absorbed", "wetness"), (DUST, STAIN)
-"""What tools and machines change: fields of states, and of these the particles that are left."""
+def _idle(step: EventStep) -> Array:
+    rests = coat.wipes_nothing(step) & washing.idle(step) & reactions.idle(step)
+    if applying.exist(step.model):
+        rests &= applying.rests(applying.applied(step, applying.dipped(step)))
+    return rests
+
+
+CLEANED, DIRT = ("coat", "absorbed", "wetness", "volume", "lost", "drawn"), (DUST, STAIN)
+"""What appliers, tools and machines change: fields of states, and of these the particles that are left."""
 
 COAT = dataclasses.replace(
     coat.SPEC,
     update=lambda step: reactions.update(_cleaned(step)),
-    idle=lambda step: coat.wipes_nothing(step) & washing.idle(step) & reactions.idle(step),
+    idle=_idle,
 )
-"""What tools wipe off and machines wash, and then what transition rules make of contents and coats."""
+"""What appliers apply, tools wipe off and machines wash, and then what transition rules make of contents and coats."""
 
 SUBSTANCE_STATES: tuple[StateSpec, ...] = (volume.SPEC, COAT, things.SPEC, solid.SPEC)
 """Volumes and streams; coats and reactions; objects that exist; solids."""
