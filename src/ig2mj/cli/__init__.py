@@ -52,6 +52,7 @@ from ig2mj.errors import Ig2mjError
 from ig2mj.install_hint import pip_install_module
 from ig2mj.plugins import Registry
 from ig2mj.plugins.named_files import name_file
+from ig2mj.process.out_of_memory import is_out_of_memory, out_of_memory_text
 from ig2mj.process.settings import default_variables
 from ig2mj.process.spawning import allow_spawning
 from ig2mj.process.variables import error_of_variable
@@ -166,6 +167,8 @@ def describe_error(error: Exception) -> tuple[str, int]:
         return f"{where}{error.strerror or error}", 2
     if (known := error_of_variable(error)) is not None:
         return str(known), 2
+    if is_out_of_memory(error):
+        return out_of_memory_text(error), 2
     text = " ".join(str(error).split())
     return f"ig2mj failed with {type(error).__name__}: {text} (run it again with --debug for the traceback)", 1
 

@@ -134,7 +134,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
     from ig2mj.learn.best import COUNTED, SUCCESS, Best
     from ig2mj.learn.checkpoints import Checkpoints
     from ig2mj.learn.demos import load_demos
-    from ig2mj.learn.device_memory import is_out_of_memory, too_large
+    from ig2mj.learn.device_memory import too_large
     from ig2mj.learn.occlusion.encoder_pretraining import pretrain
     from ig2mj.learn.perception import Perception, depth_range_of
     from ig2mj.learn.policies import Policy, depends_on, objects_on_card, robot_folder, world_of
@@ -143,6 +143,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
     from ig2mj.learn.train import Run, train
     from ig2mj.learn.warm_start import init_from_policy
     from ig2mj.process import keep_scratch_in_place
+    from ig2mj.process.out_of_memory import is_out_of_memory
     from ig2mj.sensors.base import SensorOptions
 
     algo, obs, seed, devices = chosen.algo, chosen.obs, chosen.seed, chosen.devices

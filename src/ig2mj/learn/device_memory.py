@@ -9,9 +9,6 @@ import jax
 
 from ig2mj.learn.iteration import Algorithm
 
-OUT_OF_MEMORY = ("RESOURCE_EXHAUSTED", "Out of memory", "Failed to allocate")
-"""What XLA's and Warp's errors say, which have no type of their own."""
-
 COPIES = 2.2
 """Memory of a device per byte of an environment's state: the state before and after a step, and what a step needs
 besides. Measured with 4,096 worlds of CookingMeat on an H200, state observations and RGB-D: 2.15 and 2.26."""
@@ -21,11 +18,6 @@ USED = 0.9
 
 STEP = 64
 """Numbers of worlds are suggested in multiples of this."""
-
-
-def is_out_of_memory(error: BaseException) -> bool:
-    """Whether a device had too little memory."""
-    return any(sign in str(error) for sign in OUT_OF_MEMORY)
 
 
 def world_bytes(env: Any) -> float:

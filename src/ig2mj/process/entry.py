@@ -6,6 +6,8 @@ would differ from those of a process without it, in results and in speed, and so
 must keep their types. A solver elsewhere in the process may need the option, and arrays that MJX and Flax make have no
 stated types. So every entry point is traced and run with the option off, in this thread and until it returns.
 
+**Memory.** Where a device or the machine has too little of it, every entry point raises EngineError with the remedy.
+
 **No fork.** JAX's threads do not exist in a process that was forked from one where JAX runs, and the first program
 there waits for them for ever. Every entry point refuses to run there.
 """
@@ -20,6 +22,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from ig2mj.errors import EngineError
+from ig2mj.process.out_of_memory import is_out_of_memory, out_of_memory_text
 
 T = TypeVar("T")
 
@@ -62,10 +65,15 @@ def _guarded(function: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
         refuse_fork()
-        if not (_jax or _imported()).config.jax_enable_x64:
-            return function(*args, **kwargs)
-        with _jax.enable_x64(False):
-            return function(*args, **kwargs)
+        try:
+            if not (_jax or _imported()).config.jax_enable_x64:
+                return function(*args, **kwargs)
+            with _jax.enable_x64(False):
+                return function(*args, **kwargs)
+        except (RuntimeError, MemoryError) as error:
+            if is_out_of_memory(error):
+                raise EngineError(out_of_memory_text(error)) from error
+            raise
 
     return call
 
