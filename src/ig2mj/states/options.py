@@ -21,6 +21,7 @@ class StateOptions:
       drying_rate: droplets per second that a wet object loses. Beyond iGibson, where nothing ever dries; 0 is off.
       contact_heat_rate: 1/s, rate at which two touching objects with temperatures approach each other. Beyond
         iGibson, where heat passes from sources only; 0 is off.
+      soiling: what touches something that is covered with a substance is covered with it, too. Beyond iGibson.
       occlusion: `in_fov_of_agent` asks for an unobstructed line of sight, not only for the view frustum.
       image_aspect: width over height of the agent's camera image.
     """
@@ -29,6 +30,7 @@ class StateOptions:
     timestep: float = CONTROL_TIMESTEP
     drying_rate: float = 0.0
     contact_heat_rate: float = 0.0
+    soiling: bool = False
     occlusion: bool = True
     image_aspect: float = 1.0
 

@@ -239,7 +239,12 @@ def _put(model: StateModel, states: ExtendedStates, field: str, obj: int, name: 
 
 def _initial(model: StateModel) -> dict[str, np.ndarray]:
     shape = (1, len(of(model).covered), len(of(model).names))
-    return {"coat": np.zeros(shape, np.uint32), "absorbed": np.zeros(shape, np.float32)}
+    dries = shape if model.options.drying_rate else (1, 0, 0)
+    return {
+        "coat": np.zeros(shape, np.uint32),
+        "absorbed": np.zeros(shape, np.float32),
+        "drying": np.zeros(dries, np.float32),  # parts of the next point that dries
+    }
 
 
 def _inherit(states: ExtendedStates, cut: Cut) -> dict[str, Array]:
@@ -276,7 +281,7 @@ SPEC = StateSpec(
     get=_get,
     abilities=None,
     of_substances=True,
-    fields={"coat": UInt32[Array, "W D U"], "absorbed": Float[Array, "W D U"]},
+    fields={"coat": UInt32[Array, "W D U"], "absorbed": Float[Array, "W D U"], "drying": Float[Array, "W Dd Ud"]},
     initial=_initial,
     update=wipe,
     idle=wipes_nothing,

@@ -17,7 +17,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.relations import Relations
 from ig2mj.states.spec import EventStep
-from ig2mj.states.substances import applying, coat, reactions, volume, washing
+from ig2mj.states.substances import applying, coat, drying, reactions, volume, washing
 from ig2mj.states.world import ExtendedStates
 
 FIELDS = ("volume", "lost", "drawn", "coat", "absorbed")
@@ -45,6 +45,7 @@ def possible(model: StateModel) -> bool:
     """Whether a scene has such steps."""
     return (
         model.substances is not None
+        and not drying.is_on(model)
         and volume.has_outlets(model)
         and all(spec.idle is not None for spec in _others(model))
     )

@@ -12,7 +12,7 @@ from ig2mj.engine.view import Array
 from ig2mj.states.definitions.dust import DUST
 from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.spec import EventStep, StateSpec
-from ig2mj.states.substances import applying, coat, reactions, solid, things, volume, washing
+from ig2mj.states.substances import applying, coat, drying, reactions, solid, things, volume, washing
 
 if TYPE_CHECKING:
     from ig2mj.states.world import ExtendedStates
@@ -49,7 +49,7 @@ def _changing(states: ExtendedStates) -> tuple[list[Array], list[Array]]:
 
 
 def _idle(step: EventStep) -> Array:
-    rests = coat.wipes_nothing(step) & washing.idle(step) & reactions.idle(step)
+    rests = coat.wipes_nothing(step) & washing.idle(step) & reactions.idle(step) & drying.idle(step)
     if applying.exist(step.model):
         rests &= applying.rests(applying.applied(step, applying.dipped(step)))
     return rests
@@ -60,7 +60,7 @@ CLEANED, DIRT = ("coat", "absorbed", "wetness", "volume", "lost", "drawn"), (DUS
 
 COAT = dataclasses.replace(
     coat.SPEC,
-    update=lambda step: reactions.update(_cleaned(step)),
+    update=lambda step: reactions.update(drying.update(_cleaned(step))),
     idle=_idle,
 )
 """What appliers apply, tools wipe off and machines wash, and then what transition rules make of contents and coats."""
