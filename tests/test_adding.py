@@ -24,6 +24,7 @@ FILES = {
     "A sensor": "ig2mj/sensors/definitions/clearance.py",
     "A robot": "ig2mj/agents/trolley.py",
     "An activity": "ig2mj/tasks/activities/clearing_table.py",
+    "A primitive": "ig2mj/planning/lifting.py",
     "A sub-command": "ig2mj/cli/rooms.py",
     "An overlay": "ig2mj/viewer/speed.py",
     "A mesh format": "ig2mj_converters/reading/off_files.py",
@@ -42,6 +43,16 @@ LINES = {
     "ig2mj/agents/registry.py": [('    "fetch": ', '    "trolley": "ig2mj.agents.trolley:Trolley",\n')],
     "ig2mj/tasks/registry.py": [
         ('    "GraspingBook": ', '    "ClearingTable": "ig2mj.tasks.activities.clearing_table:CLEARING_TABLE",\n')
+    ],
+    "ig2mj/planning/steps.py": [
+        (
+            '    Primitive("navigate_to"',
+            '    Primitive("lift", ("object",), "the object is in a hand", "it is 0.1 m higher"),\n',
+        )
+    ],
+    "ig2mj/planning/primitives.py": [
+        ("from ig2mj.planning.moves", "from ig2mj.planning.lifting import lift\n"),
+        ('    "navigate_to": ', '    "lift": lift,\n'),
     ],
     "ig2mj/cli/__init__.py": [('    "states": ', '    "rooms": "list the rooms of a home",\n')],
     "ig2mj/viewer/overlays.py": [
@@ -123,6 +134,13 @@ except EngineError as error:
 from ig2mj_converters.base.file_access import FileGuard
 from ig2mj_converters.reading.mesh_files import read_collision
 
+world = ig2mj.Simulation(ig2mj.load_scene(home, agents=[make_robot("humanoid").at(-0.45, 0.0, 0.0)]), grasping="assisted")
+told["lift"] = []
+for name in ("lift", "grasp", "lift"):
+    height = world.object_pose("apple")[0][2]
+    outcome = world.agent.do(name, "apple")
+    told["lift"].append([outcome.done, outcome.detail, float(world.object_pose("apple")[0][2] - height)])
+
 mesh = pathlib.Path(folder) / "tetrahedron.off"
 mesh.write_text("OFF 4 4 6  0 0 0  1 0 0  0 1 0  0 0 1  3 0 2 1  3 0 1 3  3 0 3 2  3 1 2 3")
 meshes, _ = read_collision(mesh, FileGuard(mesh))
@@ -189,6 +207,14 @@ def test_a_robot_is_one_file_and_one_line(told):
 def test_an_activity_with_its_expert_is_one_file_and_one_line(told):
     assert told["names before loading"][0] == told["listed"] == "ClearingTable"
     assert len(told["expert"]) == 6 and max(map(abs, told["expert"])) == pytest.approx(1.0)
+
+
+def test_a_primitive_is_one_file_and_two_lines(told, repository):
+    (refused, why, _), (taken, _, _), (lifted, _, by) = told["lift"]
+    assert not refused and why == "no hand holds apple"
+    assert taken and lifted and by == pytest.approx(0.1, abs=0.03)
+    (_, line) = LINES["ig2mj/planning/steps.py"][0]
+    assert line.strip() in (repository / "docs" / "design" / "adding.md").read_text()
 
 
 def test_a_sub_command_is_one_file_and_one_line(told):

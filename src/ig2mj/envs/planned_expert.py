@@ -5,7 +5,7 @@
     state = env.step_autoreset(state, expert(state))
 
 It plans for whatever holds in the state that it is shown, and its program ends its phases by what it sees, so that
-somebody else may act in its place: the action that it returns is what the planner would do next. It has a memory, the
+another agent may act in its place: the action that it returns is what the planner would do next. It has a memory, the
 plan and the program of each world, so it is called with every state in turn, once, and is no part of a compiled
 program.
 
@@ -116,13 +116,13 @@ class PlannedExpert:
 
 
 class _Observed(EnvironmentStage):
-    """Worlds in which somebody else acts."""
+    """Worlds in which another agent acts."""
 
     def __init__(self, env: Environment):
         super().__init__(env, ends=False)
 
     def act(self, action: Float[np.ndarray, "W m"]) -> None:
-        raise AssertionError("somebody else acts")
+        raise AssertionError("another agent acts")
 
     def ended(self, world: int) -> str | None:
         """None: the environment ends episodes."""

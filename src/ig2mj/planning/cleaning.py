@@ -119,7 +119,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                     continue
             visited.append(plan.stance)
             if failed := (yield from go(world, plan.stance)):
-                reason, detail = failed, f"no way leads to where the dirt of {name} is in reach"
+                reason, detail = failed, f"no path leads to where the dirt of {name} is in reach"
                 tried.update(spot.number for spot in plan.covered)
                 continue
             for stroke in plan.strokes:

@@ -115,7 +115,7 @@ def drive_near(world: PlannedWorld, name: str) -> Generator[Program, str, tuple[
     goal = (float(middles[best][0]), float(middles[best][1]))
     way = floor.way(here, goal) if np.isfinite(cost[best]) else None
     if way is None:
-        return "no_path", f"no way leads to {name} (open the doors in between)"
+        return "no_path", f"no path leads to {name} (open the doors in between)"
     ahead = point - middles[best]
     reason = yield drive(way, float(np.arctan2(ahead[1], ahead[0])))
     return reason, ""

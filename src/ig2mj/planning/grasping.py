@@ -89,7 +89,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         nowhere = 0
         (stance, pose), before = found, world.com(name)
         if reason := (yield from go(world, stance)):
-            detail = f"no way leads to where a hand reaches {name}"
+            detail = f"no path leads to where a hand reaches {name}"
             continue
         if np.linalg.norm(world.com(name) - before) > MOVED:
             reason, detail = "no_grasp", f"{name} was moved while the robot went there"
@@ -116,7 +116,7 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     start, quat = pose.at(pose.before), world.body.turned(hand, pose.fingers, pose.palm)
     way = yield from from_home(world, hand, functools.partial(_way, world, name, hand, pose))
     if way is None:
-        return "no_path", f"the hand has no way to {name}"
+        return "no_path", f"the hand has no path to {name}"
     lift = LIFT * UP * float(pose.palm @ UP > -0.9)
     deep = vector3(pose.at(-BELOW))
     reason = yield [

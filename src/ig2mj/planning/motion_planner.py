@@ -148,14 +148,14 @@ class MotionPlanner:
         without: Collection[int] = (),
         world: int = 0,
     ) -> BasePlan:
-        """A way from where the robot is to a point of the floor.
+        """A path of the base from where the robot is to a point of the floor.
 
         Args:
           view: with a world axis; `world` of it is planned in. goal: x and y, m. yaw: rad, at the end; None: any.
           footprint, without: see `floor`.
 
         Returns:
-          The way. `reason` is "no_base" where the goal is not free, and "no_path" where no way leads there; then
+          The path. `reason` is "no_base" where the goal is not free, and "no_path" where no path leads there; then
           `doors` names shut doors that are in the way.
         """
         start = np.asarray(view.agent.base_pos)[world, self.agent, :2].astype(float)
@@ -199,9 +199,9 @@ class MotionPlanner:
         checks: int = HAND_CHECKS,
         seed: int = 1,
     ) -> HandPlan:
-        """A way of a hand that floats, and of what it holds, clear of everything else; the base stays where it is.
+        """A path of a floating hand, and of what it holds, clear of everything else; the base stays where it is.
 
-        The straight line is tried first, then ways over via points, then RRT-Connect (`pip install "ig2mj[plan]"`).
+        The straight line is tried first, then paths over via points, then RRT-Connect (`pip install "ig2mj[plan]"`).
         Collisions are MuJoCo's. What the hand is near to at the start or at the goal does not count within 5 cm of it.
 
         Args:
@@ -211,7 +211,7 @@ class MotionPlanner:
           checks, seed: of RRT-Connect: states that are looked at before it gives up, and its random numbers.
 
         Returns:
-          The way; `HandPlan.reason` says why there is none.
+          The path; `HandPlan.reason` says why there is none.
 
         Raises:
           PlanningError: the robot has no such hand, or it is on an arm.
@@ -238,7 +238,7 @@ class MotionPlanner:
         found, method = way.find(checks, seed)
         if found is None:
             hint = "" if is_installed() else f" (RRT-Connect might find one: {pip_install_extra('plan')})"
-            return dataclasses.replace(here, reason="no_path", detail=f"the hand has no way to {said}{hint}")
+            return dataclasses.replace(here, reason="no_path", detail=f"the hand has no path to {said}{hint}")
         points, quats = found[:, :3], way.turned(found[:, 3])
         length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
         return HandPlan(points, quats, length, method=method)
@@ -265,9 +265,9 @@ class MotionPlanner:
         samples: int = JOINT_SAMPLES,
         seed: int = 0,
     ) -> ArmPlan:
-        """A way of an arm, and of its open hand, in the space of its joints; the base stays where it is.
+        """A path of an arm, and of its open hand, in the space of its joints; the base stays where it is.
 
-        Inverse kinematics begin at several postures. The straight way to each posture is tried, then RRT-Connect.
+        Inverse kinematics begin at several postures. The straight path to each posture is tried, then RRT-Connect.
 
         Args:
           view: with a world axis; `world` of it is planned in. goal: x, y and z of the grasp point, m, world frame.
@@ -276,7 +276,7 @@ class MotionPlanner:
           samples, seed: of RRT-Connect: postures that are sampled before it gives up, and its random numbers.
 
         Returns:
-          The way; `ArmPlan.reason` says why there is none.
+          The path; `ArmPlan.reason` says why there is none.
 
         Raises:
           PlanningError: the robot has no arm that is planned.
@@ -303,7 +303,7 @@ class MotionPlanner:
             return dataclasses.replace(here, reason="no_grasp", detail=f"the arm has no room with its hand at {said}")
         found, method = way.find(q, goals, samples, seed)
         if found is None:
-            return dataclasses.replace(here, reason="no_path", detail=f"the arm has no way to {said}")
+            return dataclasses.replace(here, reason="no_path", detail=f"the arm has no path to {said}")
         return dataclasses.replace(here, joints=found, method=method)
 
     def _blocked(
@@ -315,9 +315,9 @@ class MotionPlanner:
         without: Collection[int],
         world: int,
     ) -> BasePlan:
-        """What keeps the robot from its goal: shut doors, where there is a way without them."""
+        """What keeps the robot from its goal: shut doors, where there is a path without them."""
         doors = [int(d) for d in door_objects(self.scene.tables) if d not in without]
-        said = f"no way leads to ({goal[0]:.2f}, {goal[1]:.2f}) m"
+        said = f"no path leads to ({goal[0]:.2f}, {goal[1]:.2f}) m"
         way = self.floor(view, footprint, {*without, *doors}, world).way(here[0], goal) if doors else None
         if way is None:
             return BasePlan(here, reason="no_path", detail=said)

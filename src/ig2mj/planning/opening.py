@@ -155,10 +155,10 @@ def move_joint(
     if found is None:
         return "no_base", f"no free floor from which a hand can move {joint.name}"
     if reason := (yield from go(world, found.stance)):
-        return reason, f"no way leads to where a hand can move {joint.name}"
+        return reason, f"no path leads to where a hand can move {joint.name}"
     program = yield from from_home(world, hand, functools.partial(_program, world, joint, hand, found))
     if program is None:
-        return "no_path", f"the hand has no way to {joint.name}"
+        return "no_path", f"the hand has no path to {joint.name}"
     reason = yield program
     yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=6, after="")]
     yield withdraw(world, hand)

@@ -219,7 +219,7 @@ def bring_out(world: PlannedWorld, name: str) -> Primitive:
 
 
 _NO_SPOT, _NO_STANCE = "there is no room for a place where", "no free floor is in reach of a place where"
-_NO_WAY = "the hand has no way to a place where"
+_NO_WAY = "the hand has no path to a place where"
 
 
 def _lacking(found: str) -> str:

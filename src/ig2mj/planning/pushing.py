@@ -74,7 +74,7 @@ def push(world: PlannedWorld, step: Step) -> Primitive:
         plan = functools.partial(_program, world, name, other, hand, point, direction)
         program = yield from from_home(world, hand, plan)
         if not program:
-            reason, detail, failed = "no_path", f"the hand has no way to {name}", failed + 1
+            reason, detail, failed = "no_path", f"the hand has no path to {name}", failed + 1
             continue
         reason = yield program
         failed += float(np.linalg.norm(world.com(name) - before)) < PRESS

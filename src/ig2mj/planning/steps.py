@@ -15,7 +15,7 @@ from ig2mj.sampling.conditions import Condition
 REASONS = {
     "no_base": "no free floor from which the robot reaches it",
     "no_grasp": "no hand can take hold of it: out of reach, shut in, too heavy, or the hands are full",
-    "no_path": "no way there without a collision",
+    "no_path": "no path there without a collision",
     "slipped": "the hand lost what it held",
     "not_true_after": "the motion ended and the condition is false",
     "timeout": "the time limit passed",
@@ -48,7 +48,7 @@ class Primitive:
 
 
 _PRIMITIVES = (
-    Primitive("navigate_to", ("object",), "a way over free floor", "the robot stands where its hands reach the object"),
+    Primitive("navigate_to", ("object",), "a path over free floor", "the robot stands where its hands reach the object"),
     Primitive("grasp", ("object",), "a free hand; the object is not shut in", "a hand holds the object"),
     Primitive(
         "place_on_top", ("object", "support"), "the object is in a hand", "on_top(object, support)",

@@ -67,7 +67,7 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             quat = world.body.turned(hand, fingers, DOWN)
             way = yield from from_home(world, hand, functools.partial(_way, world, hand, aim, fingers))
             if way is None:
-                reason, detail = "no_path", f"the hand has no way to the button of {name}"
+                reason, detail = "no_path", f"the hand has no path to the button of {name}"
                 continue
             at = _pressing(button, fingers, lower)
             reason = yield [

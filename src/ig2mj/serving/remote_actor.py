@@ -28,7 +28,7 @@ class RemoteActor:
     def __call__(self, state: EnvState) -> Float[np.ndarray, "W n"]:
         """Actions of all worlds; zeros where the episode is over.
 
-        Raises PolicyServerError: the server is gone, too slow, or answers with what is no action.
+        Raises PolicyServerError: the server is gone, too slow, or answers with something other than actions.
         """
         start, over = np.asarray(begins(state)), np.asarray(state.done)
         size = self._env.action_space.shape[0]

@@ -5,7 +5,7 @@
 - The base is differential with one wheel on either side, skid-steer with more. It is omnidirectional where wheels point
   in different directions, where all of them swivel, or where names say so.
 - Grippers are joints named as fingers or jaws, and where an arm has none of those, the short branches at its end.
-- Legs are refused: nothing here walks. So are wheels that are steered like a car's.
+- Legs are refused: ig2mj does not simulate walking. So are wheels that are steered like a car's.
 """
 
 from __future__ import annotations
