@@ -117,6 +117,14 @@ def test_streams_begin_when_all_their_memory_is_there(monkeypatch):
     assert "memory" not in events[first:last]
 
 
+def test_a_kernel_of_upstreams_is_asked_for_its_threads_where_it_is_launched(monkeypatch):
+    monkeypatch.setattr(branches._noting, "original", lambda *_: lambda kernel, device: (64, 132))
+    monkeypatch.setattr(branches.phases, "kind", lambda kernel: (6, 6))
+    for phases_run, threads in ((True, (1, 1)), (False, (64, 132))):
+        monkeypatch.setattr(branches, "runs", lambda group, phases_run=phases_run: phases_run)
+        assert branches._block_size(None, None) == threads
+
+
 @pytest.mark.slow
 def test_contacts_are_those_of_one_kernel_for_each_kind(kernel_device, monkeypatch):
     model = mujoco.MjModel.from_xml_string(SCENE)

@@ -75,7 +75,7 @@ def test_an_arm_among_sleeping_boxes_moves_as_upstream(kernel_device):
     assert np.abs(own[:before, :, lift]).max() < 1e-3, "gravity is compensated"
 
 
-ON_A_GPU = ("branches", "pair_lists", "phases", "distances", "resting", "compact_solver")
+ON_A_GPU = ("branches", "pair_lists", "phases", "resting", "compact_solver")
 """Groups of patches that touch each other most; on a GPU each compiles for a minute."""
 
 

@@ -48,7 +48,9 @@ class Primitive:
 
 
 _PRIMITIVES = (
-    Primitive("navigate_to", ("object",), "a path over free floor", "the robot stands where its hands reach the object"),
+    Primitive(
+        "navigate_to", ("object",), "a path over free floor", "the robot stands where its hands reach the object"
+    ),
     Primitive("grasp", ("object",), "a free hand; the object is not shut in", "a hand holds the object"),
     Primitive(
         "place_on_top", ("object", "support"), "the object is in a hand", "on_top(object, support)",

@@ -92,8 +92,8 @@ def _note(kernel: wp.Kernel, dim: Any, inputs: Any, outputs: Any, **options: Any
 
 
 def _block_size(kernel: wp.Kernel, device: Any) -> tuple[int, int]:
-    if phases.kind(kernel):
-        return 1, 1  # it is not launched, and the true number would have it compiled
+    if phases.kind(kernel) and runs("phases"):
+        return 1, 1  # both phases are launched in its place, and the true number would have it compiled
     return _noting.original(wp, "get_suggested_block_size")(kernel, device)
 
 

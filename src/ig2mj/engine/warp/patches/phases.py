@@ -22,10 +22,8 @@ import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_convex
 from mujoco.mjx.third_party.mujoco_warp._src.collision_gjk import GJKResult
 
-from ig2mj.engine.warp.patches.distances import distance_phase
 from ig2mj.engine.warp.patches.replacements import original
 from ig2mj.engine.warp.patches.sources import defined
-from ig2mj.engine.warp.patches.table import runs
 
 SECOND_BLOCK = 32
 """Threads of a block of the second phase: its pairs are few and take long, so they are spread out, and a thread may
@@ -131,10 +129,7 @@ def _builder(phase: str) -> Any:
         if isinstance(node, ast.Return):
             node.value = ast.Name(kernel.name, ast.Load())
     text = ast.unparse(ast.fix_missing_locations(ast.Module([builder], []))) + "\n"
-    own: dict[str, Any] = {"Found": Found, "__name__": __name__}
-    if runs("distances"):
-        own["gjk_phase"] = distance_phase
-    return defined(builder.name, text, {**upstream.__globals__, **own})
+    return defined(builder.name, text, {**upstream.__globals__, "Found": Found, "__name__": __name__})
 
 
 OUTPUTS = ("found_out: wp.array[Found]", "listed_out: wp.array[int]", "count_out: wp.array[int]")

@@ -54,14 +54,13 @@ GROUPS = {
     "branches": Group("convex kernels of all kinds run side by side", ("branches",)),
     "pair_lists": Group("each convex kernel gets a list of its own pairs, sorted by geoms", ("pair_lists",)),
     "phases": Group("depths and several contacts are found by a second convex kernel", ("phases",)),
-    "distances": Group("GJK of the first phase with a quarter of the code", ("distances",)),
     "compact_solver": Group("the solver's matrices are computed only as far as dofs are awake", ("compact_solver",)),
     "grid_stride": Group("constraint rows and Hessian by a few threads a world", ("grid_stride",)),
     "solver_loop": Group("later solver iterations of a world in one kernel", ("solver_loop", "line_search")),
     "scratch": Group("temporary arrays of all CUDA graphs share one block of memory", ("scratch",)),
     "contact_nnz": Group("the size of contact rows is counted with arrays (start-up)", ("contact_nnz",)),
 }
-"""By name. `phases` and `pair_lists` work with and without `branches`; `distances` is a part of `phases`."""
+"""By name. `phases` and `pair_lists` work with and without `branches`."""
 
 
 @functools.cache
