@@ -100,8 +100,8 @@ class StepBuilder:
         return tuple(h for h, arguments in own.items() if self._facts.holds(c.predicate, *arguments) != c.value)
 
     def _tool(self, c: Condition) -> str:
-        """What cleans or cuts: one in a hand first, then a soaked one for stains, then one that is not shut in; after
-        failures the next."""
+        """What cleans or cuts: one in a hand first, then a soaked one for stains, one that needs no switch, one that is
+        not shut in; after failures the next."""
         knife = c.predicate == "sliced"
         tools = [t for t in (self._domain.knives if knife else self._domain.tools) if t != c.arguments[0]]
         if c.predicate == "stained":
@@ -117,6 +117,7 @@ class StepBuilder:
                 + self._failures((uses, c.arguments[0], tool)) // 2,
                 tool not in self._held,
                 c.predicate == "stained" and not self._soaked(tool),
+                self._domain.has(tool, "toggleable"),
                 bool(self._shut_in(tool)),
                 tool not in named,
                 tools.index(tool),
