@@ -146,7 +146,7 @@ def _said(error: Exception) -> str:
 
 @contextlib.contextmanager
 def blamed(code: TaskCode | None, part: str) -> Iterator[None]:
-    """Errors of what a task names are of the task's file, where it has one.
+    """Within the block, errors about what a task names name the task's file, where it has one.
 
     Args:
       part: of the task's definition, such as "goal".

@@ -63,7 +63,7 @@ def _register_definition(file: str) -> AnyTask:
 
 
 def refuse_unknown(name: str, file_name: object, file: object) -> None:
-    """Whether the task of a file, such as a recording, is known.
+    """Checks that the task that a file, such as a recording, names is known.
 
     Args:
       file_name: of the code in which it is defined, as the file says; None: it is none of the user's.

@@ -1,7 +1,7 @@
 """`CustomObjective`: the objective of a task with some of it in functions of the user's.
 
-What the functions do not say is the base objective's. All are called when the environment is made, on arrays without
-values, so that a wrong shape or a name that does not exist is an error then.
+What the functions leave out comes from the base objective. All are called when the environment is made, on arrays
+without values, so that a wrong shape or a name that does not exist is an error then.
 
 Axes: W worlds.
 """

@@ -33,8 +33,7 @@ CLEARANCE = 0.06
 
 EXACT, BLEND = 0.015, 0.03
 """m next to the axis within which the gripper goes straight down, and over which it comes to do so. The fingers have as
-much on either side of a towel; a policy that learns from images, and waits until it is nearer, hovers above it for
-ever."""
+much on either side of a towel; with a smaller distance, a policy that sees images stays above it."""
 
 EASE = 0.6
 """Share of the way to it that the gripper goes in an action; the arm lags, and with all of it swings to and fro."""
@@ -56,7 +55,7 @@ AHEAD, LEFT, UP = np.eye(3, dtype=np.float32)
 
 
 def grip_standing(see: ExpertView, name: str, carry: Float[Array, "W 3"]) -> HandMotion:
-    """What Fetch's gripper does to an object that stands on end, and is narrower than it opens: from above, a finger on
+    """Fetch's gripper takes an object that stands on end, and is narrower than it opens, from above, with a finger on
     either side.
 
     Args:
@@ -81,7 +80,7 @@ def grip_standing(see: ExpertView, name: str, carry: Float[Array, "W 3"]) -> Han
 
 
 def grip_from_above(see: ExpertView, name: str, along: Float[Array, "W 3"], carry: HandMotion) -> HandMotion:
-    """What Fetch's gripper does to something long on a table that is narrower than it opens: pointing down, a finger on
+    """Fetch's gripper takes something long on a table that is narrower than it opens: pointing down, with a finger on
     either side of its centre of mass, so that it does not tip between them.
 
     Args:
