@@ -38,6 +38,20 @@ SHARP = 3.0
 """Factor of maps before their softmax: without it an untrained softmax is even, and hardly changes."""
 
 
+def orthogonal(scale: float) -> Callable[..., Array]:
+    """Initializer of orthogonal matrices, multiplied by `scale`; flax's, one matrix after another.
+
+    A factorization of several matrices at once, as of two critics, waits for threads of XLA's pool from one of them:
+    with two cores jaxlib 0.10.2 waits forever.
+    """
+    one = nn.initializers.orthogonal(scale)
+
+    def init(key: Array, shape: Sequence[int], dtype: Any = jnp.float32) -> Array:
+        return jax.custom_batching.sequential_vmap(lambda key: one(key, shape, dtype))(key)
+
+    return init
+
+
 class Trunk(nn.Module):
     """Dense layers, each with layer normalization and SiLU."""
 
@@ -46,7 +60,7 @@ class Trunk(nn.Module):
     @nn.compact
     def __call__(self, x: Float[Array, "B x"]) -> Float[Array, "B y"]:
         for size in self.sizes:
-            x = nn.silu(nn.LayerNorm()(nn.Dense(size, kernel_init=nn.initializers.orthogonal(2**0.5))(x)))
+            x = nn.silu(nn.LayerNorm()(nn.Dense(size, kernel_init=orthogonal(2**0.5))(x)))
         return x
 
 
@@ -192,7 +206,7 @@ class ActorNetwork(nn.Module):
         if remembered is not None:
             vector = jnp.concatenate([vector, remembered], axis=-1)
         x = Trunk(self.sizes, name="trunk")(vector)
-        small = nn.initializers.orthogonal(0.01)
+        small = orthogonal(0.01)
         if self.bins:
             logits = nn.Dense(self.action_size * self.bins, kernel_init=small, name="choice")(x)
             shape = (-1, self.action_size, self.bins)
