@@ -20,8 +20,29 @@ from ig2mj.scene.tables import PieceKind
 SEEDS = st.integers(0, 2**31)
 PAIRS = np.array(list(itertools.combinations(range(10), 2)))
 IDENTITY = np.array([1, 0, 0, 0], np.float32)
-piece_distance = jax.jit(gjk.piece_distance)
+pair_distance = jax.jit(gjk.pair_distance)
 signed_depth = jax.jit(hulls.signed_depth)
+
+
+def piece_distance(a: PosedPieces, b: PosedPieces) -> Nearest:
+    """Of each pair; leading axes of `a` and `b` broadcast. Vertices are padded by repetition to the larger number."""
+    most = max(a.vertices.shape[-2], b.vertices.shape[-2])
+    vertices = [p.vertices[..., np.minimum(np.arange(most), p.vertices.shape[-2] - 1), :] for p in (a, b)]
+
+    def joined(x: np.ndarray, y: np.ndarray, own: int) -> np.ndarray:
+        """The two side by side; `own`: the axes of one piece's value."""
+        lead = np.broadcast_shapes(x.shape[: x.ndim - own], y.shape[: y.ndim - own])
+        return jnp.stack([jnp.broadcast_to(v, (*lead, *v.shape[v.ndim - own :])) for v in (x, y)], axis=len(lead))
+
+    return pair_distance(
+        PosedPieces(
+            kind=joined(a.kind, b.kind, 0),
+            size=joined(a.size, b.size, 1),
+            vertices=joined(*vertices, 2),
+            pos=joined(a.pos, b.pos, 1),
+            quat=joined(a.quat, b.quat, 1),
+        )
+    )
 
 
 def chosen(shapes, pos, quat, index) -> PosedPieces:
@@ -156,7 +177,7 @@ def test_gradients_are_finite_everywhere_and_unit_where_apart(shapes):
     b = chosen(shapes, pos, quat, PAIRS[:, 1])
 
     def total(pos, quat):
-        near = gjk.piece_distance(chosen(shapes, pos, quat, PAIRS[:, 0]), b)
+        near = piece_distance(chosen(shapes, pos, quat, PAIRS[:, 0]), b)
         return jnp.sum(near.distance), near
 
     (by_pos, by_quat), near = jax.jit(jax.grad(total, argnums=(0, 1), has_aux=True))(

@@ -1,4 +1,4 @@
-"""Distance and nearest points of two convex pieces of any kind, and of a point and a piece.
+"""Distance and nearest points of two convex pieces of any kind.
 
 The method is GJK on the pieces' cores (a sphere's centre, a capsule's axis, the whole of cylinders and polyhedra); the
 cores' radii are taken off at the end. A loop runs until every pair has converged, at most `MAX_STEPS` times. The
@@ -22,7 +22,6 @@ from ig2mj.geometry.hulls import core_radius, core_support
 from ig2mj.geometry.poses import (
     AnyArray,
     length,
-    namespace,
     normalize,
     quat_normalize,
     quat_rotate,
@@ -74,36 +73,12 @@ class Nearest:
     overlap: Bool[Array, "*b"]
 
 
-def piece_distance(a: PosedPieces, b: PosedPieces) -> Nearest:
-    """Distance and nearest points of each pair of pieces (leading axes of `a` and `b` broadcast); NaN for NaN poses."""
-    most = max(a.vertices.shape[-2], b.vertices.shape[-2])
-
-    def joined(x: AnyArray, y: AnyArray, own: int) -> AnyArray:
-        """The two side by side; `own`: the axes of one piece's value."""
-        lead = np.broadcast_shapes(x.shape[: x.ndim - own], y.shape[: y.ndim - own])
-        xp = namespace(x, y)
-        return xp.stack([xp.broadcast_to(v, (*lead, *v.shape[v.ndim - own :])) for v in (x, y)], axis=len(lead))
-
-    def with_vertices(piece: PosedPieces) -> AnyArray:
-        """Padded by repetition to the larger number."""
-        values = piece.vertices
-        return values[..., np.minimum(np.arange(most), values.shape[-2] - 1), :] if values.shape[-2] < most else values
-
-    return pair_distance(
-        PosedPieces(
-            kind=joined(a.kind, b.kind, 0),
-            size=joined(a.size, b.size, 1),
-            vertices=joined(with_vertices(a), with_vertices(b), 2),
-            pos=joined(a.pos, b.pos, 1),
-            quat=joined(a.quat, b.quat, 1),
-        )
-    )
-
-
 def pair_distance(pairs: PosedPieces) -> Nearest:
-    """As `piece_distance` of pieces that stand side by side: the last leading axis holds the two pieces of a pair.
+    """Distance and nearest points of pairs of pieces; NaN for NaN poses.
 
-    Side by side, both pieces are one operation in all that is done with each, which halves the time to compile.
+    Args:
+      pairs: fields [*b, 2, ...]: the last leading axis holds the two pieces of a pair. Side by side, both are one
+        operation in all that is done with each, which halves the time to compile.
     """
     cores, apart = _core_witnesses(jax.lax.stop_gradient(pairs))
     world = jnp.add(pairs.pos, quat_rotate(pairs.quat, cores))

@@ -24,7 +24,7 @@ def signed_depth(
 
     Inside it is the distance to the surface. Outside it is exact (the negative distance) for round pieces; for
     polyhedra it is the negative distance from the farthest violated face's plane, which underestimates the distance
-    where an edge or a corner is nearest (`ig2mj.geometry.gjk.piece_distance` is exact there).
+    where an edge or a corner is nearest (`ig2mj.geometry.gjk.pair_distance` is exact there).
     """
     xp = namespace(size, planes, point)
     radius, half = size[..., 0], size[..., 1]
