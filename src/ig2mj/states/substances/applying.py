@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
-from ig2mj.geometry.poses import quat_rotate, quat_rotate_inverse
+from ig2mj.geometry.poses import quat_rotate, quat_to_matrix
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep
 from ig2mj.states.substances import coat
@@ -76,10 +76,14 @@ def dipped(step: EventStep) -> Bool[Array, "W A C"]:
     rows, containers = found.row[absorbers(step.model)], found.containers
     own_pos, own_quat = (jnp.asarray(x)[:, found.body[rows]] for x in (view.body_pos, view.body_quat))
     points = own_pos + quat_rotate(own_quat, found.pos[rows])  # [W, A, N, 3]
-    pos, quat = (jnp.asarray(x)[:, None, containers.body, None] for x in (view.body_pos, view.body_quat))
-    local = quat_rotate_inverse(quat, points[:, :, None] - pos)  # [W, A, C, N, 3]
-    low, high = found.things.low[:, None], found.things.high[:, None]
-    there = jnp.any(jnp.all((local >= low) & (local <= high), axis=-1), axis=-1)
+    pos, quat = (jnp.asarray(x)[:, containers.body] for x in (view.body_pos, view.body_quat))
+    axes = quat_to_matrix(quat)[:, None, :, None]  # [W, 1, C, 1, 3, 3]
+    offset = [points[:, :, None, :, i] - pos[:, None, :, None, i] for i in range(3)]
+    within = jnp.ones((1, 1, 1, 1), bool)  # [W, A, C, N], number by number: one kernel
+    for j in range(3):
+        local = sum(axes[..., i, j] * offset[i] for i in range(3))
+        within &= (local >= found.things.low[:, None, j]) & (local <= found.things.high[:, None, j])
+    there = jnp.any(within, axis=-1)
     return there & (containers.object != absorbers(step.model)[:, None])
 
 

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.first_fall import FallPieces, Ways, first_met
-from ig2mj.geometry.poses import quat_rotate_inverse
+from ig2mj.geometry.poses import quat_to_matrix
 from ig2mj.scene.tables import SceneTables
 from ig2mj.states.substances.containers import Containers, Openings
 
@@ -127,14 +127,14 @@ def _openings_met(
     offset = at - centre
     below = jnp.sum(offset * normal, axis=-1) / jnp.where(faces, normal[..., 2], 1.0)  # how far down the plane is
     crosses = faces & (below >= -1e-6) & (below <= lengths[..., None])
-    hit = offset - below[..., None] * np.array([0.0, 0.0, 1.0], np.float32)  # from the centre, world axes
-    quat = falling.body_quat[:, containers.body][:, None, None]
-    local = quat_rotate_inverse(quat, hit)
+    hit = [offset[..., 0], offset[..., 1], offset[..., 2] - below]  # from the centre, world axes
+    axes = quat_to_matrix(falling.body_quat[:, containers.body])[:, None, None]
+    local = [sum(axes[..., i, j] * hit[i] for i in range(3)) for j in range(3)]
     corners = containers.rim - containers.centre[:, None]  # [C, R, 3]
     edges = np.roll(corners, -1, axis=1) - corners
     outwards = np.cross(edges, np.broadcast_to(containers.normal[:, None], edges.shape))
     limit = np.sum(corners * outwards, axis=-1) + 1e-9
     inside = crosses & ~falling.source[:, :, None]
     for corner in range(outwards.shape[1]):  # a few products each: no product of matrices
-        inside &= sum(local[..., i] * outwards[:, corner, i] for i in range(3)) <= limit[:, corner]
+        inside &= sum(local[i] * outwards[:, corner, i] for i in range(3)) <= limit[:, corner]
     return jnp.min(jnp.where(inside, below + depths[:-1, None], jnp.inf), axis=2)
