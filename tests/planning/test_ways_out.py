@@ -29,8 +29,8 @@ def floor_with_pocket(still=False):
     """4 m by 4 m of free floor, but for a frame 3 cells thick around 25 cells; `still`: the frame cannot move."""
     free = np.ones((80, 80), bool)
     free[37:48, 37:48] = False
-    frame = ~free
     free[40:45, 40:45] = True
+    frame = ~free
     return FreeFloor(_Cells(frame if still else np.zeros_like(free)), free, np.where(free, 0.1, -0.1))
 
 
@@ -41,6 +41,13 @@ def test_a_way_begins_outside_of_a_pocket_unless_furniture_shuts_it_off(still):
     begin = floor.begin(robot, 0.5)
     assert (begin >= 40).all() and (begin < 45).all() if still else floor._sizes[floor._labels[tuple(begin)]] > POCKET
     assert np.isfinite(floor.distances(robot, 0.5)).sum() == (25 if still else floor.free.sum() - 25)
+
+
+def test_a_robot_that_leans_on_furniture_begins_its_way_next_to_it():
+    free = np.ones((80, 80), bool)
+    free[30:50, 30:50] = False
+    floor = FreeFloor(_Cells(~free), free, np.where(free, 0.1, -0.1))
+    assert floor.begin((33.5 * RESOLUTION, 40.5 * RESOLUTION), 0.1) is not None
 
 
 class _Bucket(Obstacles):

@@ -74,11 +74,13 @@ class FreeFloor:
         return next((cells[k] for k in some if self._opens(here, cells[k])), nearest)
 
     def _opens(self, one: Int[np.ndarray, "2"], other: Int[np.ndarray, "2"]) -> bool:
-        """Whether nothing that cannot move is on the line between the middles of two cells."""
+        """Whether nothing that cannot move is on the line between the middles of two cells, but for what the first one
+        is in: a robot that was pushed leans on it."""
         count = 2 * int(np.abs(other - one).max()) + 1
         line = np.round(one + np.linspace(0, 1, count)[:, None] * (other - one)).astype(int)
         line = np.clip(line, 0, np.array(self.free.shape) - 1)
-        return not self.occupancy.still(LOWEST, CHEST)[tuple(line.T)].any()
+        taken = self.occupancy.still(LOWEST, CHEST)[tuple(line.T)]
+        return not taken[int(np.argmin(taken)) :].any()
 
     @functools.cached_property
     def _labels(self) -> Int[np.ndarray, "h w"]:

@@ -277,7 +277,9 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
         for depth in np.arange(CUT_ABOVE - CUT_STEP, -CUT_DEPTH - CUT_STEP / 2, -CUT_STEP):  # no farther than the cut
             blade = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
             pressed = vector3(top + depth * UP - blade + world.grip(hand))
-            reason = yield [Phase(hand=hand, pos=pressed, keeps=keeps, tolerance=0.01, limit=3, after="", speed=0.04)]
+            reason = yield [
+                Phase(hand=hand, pos=pressed, keeps=keeps, tolerance=0.005, limit=2, after="", speed=CUT_STEP)
+            ]
             if reason or world.facts.holds("sliced", name):
                 break
         reason = reason or (yield travel(hand, [before, *way[-2::-1]], None))
@@ -288,5 +290,5 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
     return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
 
-CUT_ABOVE, CUT_DEPTH, CUT_STEP = 0.08, 0.04, 0.02
+CUT_ABOVE, CUT_DEPTH, CUT_STEP = 0.08, 0.04, 0.01
 """m above what is cut at which the blade comes to it, below its top that it goes for, and between looks at it."""
