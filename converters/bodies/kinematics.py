@@ -1,4 +1,4 @@
-"""Where an object's links and shapes are at joint positions 0."""
+"""Where an object's links and shapes are at joint positions 0; those of locked joints, at their limit."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 
 from ..base.description import ObjectModel, Shape
 from ..base.transforms import apply
-from .joint_limits import motion
+from .joint_limits import clamp, is_locked, motion
 
 
 def link_poses(model: ObjectModel, joints: Mapping[str, float] | None = None) -> dict[str, np.ndarray]:
     """link -> 4x4 in the base link's frame; floating joints at their origin.
 
-    joints: positions of joints by name, rad or m; default 0.
+    joints: positions of joints by name, rad or m; default 0, or the limit of a joint that has no room to move.
     """
     given = joints or {}
     children: dict[str, list[tuple[str, np.ndarray]]] = {name: [] for name in model.links}
     for joint in model.joints.values():
-        position = given.get(joint.name, 0.0)
+        position = given.get(joint.name, clamp(joint, 0.0) if is_locked(joint) else 0.0)
         moved = joint.origin @ motion(joint, position) if position else joint.origin
         children[joint.parent].append((joint.child, moved))
     poses = {model.base: np.eye(4)}

@@ -232,6 +232,16 @@ def test_the_check_of_the_bounding_box_compares_with_the_source(tmp_path, monkey
             assert "1.4780 m, 1.4520 m in the source's meshes" in check.failures[0]["problem"]
 
 
+def test_a_joint_without_room_to_move_is_compared_at_its_limit(tmp_path):
+    box = '<collision><geometry><box size="1 0.2 0.2"/></geometry></collision>'
+    joint = '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    joint += '<limit lower="0.8" upper="0.8" effort="1" velocity="1"/></joint>'
+    file = urdf(tmp_path, f'<link name="a">{box}</link><link name="b">{box}</link>{joint}')
+    outcome = convert_object(file, "toy", tmp_path / "out", options=ConvertOptions(cache=False))
+    (check,) = [c for c in outcome.checks if c.name == "bounding_box"]
+    assert check.passed, check.failures
+
+
 def test_models_whose_mesh_files_are_gone_are_skipped_as_missing_file_by_file(dataset, tmp_path, capsys):
     import shutil
 
