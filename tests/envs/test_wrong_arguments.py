@@ -1,5 +1,8 @@
 """Wrong arguments of environments are errors of the user's, in one line, and leave the state that was given usable."""
 
+import copy
+import pickle
+
 import jax
 import jaxtyping
 import numpy as np
@@ -60,6 +63,31 @@ def test_a_seed_is_a_whole_number(env, seed):
 def test_an_environment_takes_one_key_of_jax(env, keys):
     with pytest.raises(EngineError, match="takes one key or seed for all worlds"):
         env.reset(keys)
+
+
+@pytest.mark.parametrize("use", [copy.deepcopy, pickle.dumps])
+def test_an_environment_is_neither_copied_nor_pickled(env, use):
+    with pytest.raises(EngineError, match=r"ig2mj.make makes another one.* env.fork\(state\) copies a state"):
+        use(env)
+    assert copy.copy(env).core is env.core
+
+
+@pytest.mark.parametrize("engine", [3, ("native",)])
+def test_an_engine_is_a_name_or_an_engine(engine):
+    with pytest.raises(EngineError, match="the name of an engine"):
+        ig2mj.make(TASK, engine=engine)
+
+
+@pytest.mark.parametrize("number", ["a", 1.0, True, -1, 99])
+def test_a_variant_is_a_number_of_those_there_are(number):
+    with pytest.raises(EngineError, match="of GraspingBook: there are 0 to 2"):
+        ig2mj.make("GraspingBook", engine="native", variant=number)
+
+
+@pytest.mark.parametrize("name", ["goal/", "goal/small_home", "goal/small_home (on_top apple_0"])
+def test_a_goal_without_brackets_or_home_gets_its_form(name):
+    with pytest.raises(Ig2mjError, match=r"a goal is named goal/HOME GOAL, such as .* every bracket closed"):
+        ig2mj.make(name, engine="native")
 
 
 def test_a_number_of_steps_is_given_by_name(tiny_home):

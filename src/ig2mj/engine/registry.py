@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from ig2mj.engine.base import Engine
-from ig2mj.errors import UnknownNameError
+from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.process.imports import find_devices, import_mjx
@@ -35,9 +35,14 @@ def choose_engine(engine: str | Engine | None) -> str | Engine:
     """The engine that is asked for; None: "warp" where JAX has a GPU, else "native".
 
     To be called before JAX is first used: options of the process that suit the engine are set where it can be native.
+
+    Raises:
+      EngineError: it is neither a name nor an engine.
     """
     if engine in (None, "native"):
         run_programs_inline()
+    if not isinstance(engine, str | Engine | None):
+        raise EngineError(f"engine = {engine!r}: the name of an engine ({', '.join(ENGINES)}), or one that is made")
     if engine is None:
         import jax
 

@@ -60,6 +60,11 @@ def unknown_environment(name: str, known: Sequence[str]) -> Ig2mjError:
     """The error of a name that is no environment's. known: names of environments."""
     from ig2mj.scene.paths import shipped_homes  # `import ig2mj` reads this module, and loads no MuJoCo
 
+    if name.startswith("goal/"):
+        return Ig2mjError(
+            f"'{name}': a goal is named goal/HOME GOAL, such as \"goal/small_home (inside apple_0 fridge_0)\", with"
+            " every bracket closed"
+        )
     also = "BEHAVIOR-100's are activity/NAME (`ig2mj activity list`), tasks of yours FILE.py:NAME"
     if name and (name in shipped_homes() or pathlib.Path(name).is_dir()):
         goal = f'"goal/{name} GOAL"'

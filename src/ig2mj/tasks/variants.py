@@ -44,8 +44,9 @@ def variant(task: Task, number: int, grasping: str = "mitten") -> Task:
     Raises:
       EngineError: it has no such variant.
     """
-    if number and not 0 < number < variants(task):
-        raise EngineError(f"variant {number} of {task.name}: there are 0 to {variants(task) - 1}")
+    whole = isinstance(number, int) and not isinstance(number, bool)
+    if not whole or (number and not 0 < number < variants(task)):
+        raise EngineError(f"variant {number!r} of {task.name}: there are 0 to {variants(task) - 1}")
     if grasping == "physical" and task.physical is not None:
         other, robots = task.physical, {**task.robots, **task.physical.robots}
         return dataclasses.replace(task, objects=other.objects[number], near=other.near, robots=robots)
