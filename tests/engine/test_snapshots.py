@@ -10,7 +10,7 @@ import pytest
 
 import ig2mj
 from ig2mj.engine.native.engine import NativeEngine
-from ig2mj.engine.snapshot import AXIS, FULLY_AWAKE, closed_circles
+from ig2mj.engine.snapshot import AXIS, FULLY_AWAKE, closed_circles, woken
 from ig2mj.errors import EngineError
 
 
@@ -111,3 +111,11 @@ def test_trees_of_open_circles_of_sleep_are_awake(given, closed):
     both = np.array([given, [0, 1, 2, 3]], np.int32)
     assert closed_circles(both).tolist() == [closed, [0, 1, 2, 3]]
     assert closed_circles(np.zeros((2, 0), np.int32)).shape == (2, 0)
+
+
+def test_a_tree_that_is_woken_wakes_its_island_alone():
+    circles = np.array([[1, 2, 0, 4, 3, -2], [0, 2, 1, 3, 5, 4]], np.int32)
+    found = woken(circles, np.array([1, 5]))
+    awake = FULLY_AWAKE
+    assert found.tolist() == [[awake, awake, awake, 4, 3, awake], [0, awake, awake, 3, awake, awake]]
+    assert circles[0, 0] == 1, "what is given stays as it is"

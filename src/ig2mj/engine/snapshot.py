@@ -196,6 +196,18 @@ class Snapshot:
         return self.whole("tree_asleep")
 
 
+def woken(tree_asleep: Array, trees: Int[np.ndarray, "k"]) -> Int[np.ndarray, "*W T"]:
+    """`tree_asleep` [..., T] (see `ScenePart`) in which some trees are awake, and those of the islands that they sleep
+    in."""
+    found = np.array(tree_asleep, np.int32)
+    for asleep in found.reshape(-1, found.shape[-1]):
+        for tree in trees.tolist():
+            while asleep[tree] >= 0:
+                asleep[tree], tree = FULLY_AWAKE, int(asleep[tree])
+            asleep[tree] = FULLY_AWAKE
+    return found
+
+
 def closed_circles(tree_asleep: Array) -> np.ndarray:
     """`tree_asleep` [..., T] (see `ScenePart`) in which every tree of an open circle is awake.
 

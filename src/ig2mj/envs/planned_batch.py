@@ -280,7 +280,7 @@ class _Episodes:
         began = time.perf_counter()
         for world in sorted(self.numbers):
             if terminated[world] or truncated[world]:
-                self._ended(world, bool(terminated[world]), f"the horizon of {self.env.task.horizon} steps passed")
+                self._ended(world, bool(terminated[world]), stage.ended(world) or "")
         ended = [w for w in sorted(self.numbers) if not self.carry.running[w] and w not in self.planners.asked]
         for world, copy in zip(ended, self.batch.copies(ended), strict=True):
             seconds = float((self.steps[world] - self.begun[world]) * self.env.period)

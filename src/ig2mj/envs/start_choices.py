@@ -8,7 +8,7 @@ from collections.abc import Collection
 import numpy as np
 
 from ig2mj.engine.model_fields import POSES
-from ig2mj.engine.snapshot import FULLY_AWAKE
+from ig2mj.engine.snapshot import woken
 from ig2mj.envs.setups import EnvSetup
 from ig2mj.errors import EngineError
 from ig2mj.planning.starts import open_doors
@@ -45,7 +45,8 @@ def named_objects(task: AnyTask) -> tuple[str, ...]:
 
 
 def with_open_doors(scene: Scene, starts: Pool, named: Collection[str]) -> Pool:
-    """Start states in which doors between rooms stand wide open, but for some objects.
+    """Start states in which doors between rooms stand wide open, but for some objects. What sleeps goes on sleeping,
+    but for the doors and what sleeps with them: Warp's buffers do not hold a home in which everything is awake.
 
     Args:
       scene: of the environment, with its robots. named: objects that the task names.
@@ -56,9 +57,10 @@ def with_open_doors(scene: Scene, starts: Pool, named: Collection[str]) -> Pool:
     mask, values = np.asarray(write.qpos_mask)[0], np.asarray(write.qpos)[0]
     count = np.shape(starts.physics.scene.qpos)[-1]  # robots come after everything else
     opened = np.where(mask[:count], values[:count], np.asarray(starts.physics.scene.qpos))
-    asleep = np.full_like(np.asarray(starts.physics.scene.tree_asleep), FULLY_AWAKE)
+    model, asleep = scene.model, np.asarray(starts.physics.scene.tree_asleep)
+    doors = np.unique(model.body_treeid[model.jnt_bodyid[mask[model.jnt_qposadr]]])
     part = dataclasses.replace(
-        starts.physics.scene, qpos=opened.astype(starts.physics.scene.qpos.dtype), tree_asleep=asleep
+        starts.physics.scene, qpos=opened.astype(starts.physics.scene.qpos.dtype), tree_asleep=woken(asleep, doors)
     )
     return dataclasses.replace(starts, physics=dataclasses.replace(starts.physics, scene=part))
 

@@ -75,7 +75,9 @@ class ArmBody(WheeledBody):
         self.away = ASIDE * float(links)
         self._links = LinkSpheres(scene, agent, model)
         self.arm, self.trunk = self._links.bodies, self._links.trunk
-        self._grip, self.opening, self._spheres = _gripper(scene, agent, int(self.hands[0]), self.grips[0])
+        self._grip, self.opening, self._spheres, self._corners = _gripper(
+            scene, agent, int(self.hands[0]), self.grips[0]
+        )
 
     def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
         action = np.zeros((len(senses.base_pos), self.size), np.float32)
@@ -139,9 +141,10 @@ class ArmBody(WheeledBody):
         return own[:, 1], own[:, 0]
 
     def hand_spheres(self, fingers: Direction, palm: Direction) -> Float[np.ndarray, "S 4"]:
-        x, y = np.asarray(palm, float), np.asarray(fingers, float)
-        turn = np.stack([x, y, np.cross(x, y)], axis=-1)
-        return np.column_stack([self._spheres[:, :3] @ turn.T, self._spheres[:, 3]])
+        return np.column_stack([self._spheres[:, :3] @ _frame(fingers, palm).T, self._spheres[:, 3]])
+
+    def hand_corners(self, fingers: Direction, palm: Direction) -> Float[np.ndarray, "n 3"]:
+        return self._corners @ _frame(fingers, palm).T
 
     def prepared(self, program: Sequence[Phase]) -> list[Phase]:
         """A hand that goes to rest is moved there, and one that keeps its orientation keeps that of the last phase."""
@@ -222,6 +225,12 @@ class ArmFollower:
         return self._obstacles.clear(np.column_stack([centres, spheres[:, 3]]))
 
 
+def _frame(fingers: Direction, palm: Direction) -> Float[np.ndarray, "3 3"]:
+    """Of a gripper: where it points, from finger to finger, and the third axis, as columns."""
+    x, y = np.asarray(palm, float), np.asarray(fingers, float)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
 def _jaw(robot: TaskRobot) -> JawFrame | None:
     """`jaw_frame` of a robot's gripper."""
     if not isinstance(robot, UrdfRobot) or not robot.layout.grippers:
@@ -231,9 +240,10 @@ def _jaw(robot: TaskRobot) -> JawFrame | None:
 
 def _gripper(
     scene: Scene, agent: int, hand: int, grip: Float[np.ndarray, "3"]
-) -> tuple[Float[np.ndarray, "3 3"], float, Float[np.ndarray, "S 4"]]:
+) -> tuple[Float[np.ndarray, "3 3"], float, Float[np.ndarray, "S 4"], Float[np.ndarray, "n 3"]]:
     """Of a gripper as it stands open at the start: where it points, from finger to finger, and the third axis, as
-    columns in the palm's frame; m between the fingers; spheres about the grasp point in that frame."""
+    columns in the palm's frame; m between the fingers; spheres about the grasp point in that frame, and corners of its
+    geoms' boxes."""
     model, tables, data = scene.model, scene.tables, scene.start_data()
     mujoco.mj_kinematics(model, data)
     robot = scene.agents[agent]
@@ -261,10 +271,14 @@ def _gripper(
         ahead = ahead / np.linalg.norm(ahead)
     frame = np.stack([ahead, across, np.cross(ahead, across)], axis=-1)
     collides = (model.geom_contype | model.geom_conaffinity) != 0
-    found = []
+    found, corners = [], []
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
     for geom in np.flatnonzero(collides & (tables.body_hand[model.geom_bodyid] == hand)):
+        box, turned = model.geom_aabb[geom], data.geom_xmat[geom].reshape(3, 3)
+        at = (box[:3] + signs * box[3:]) @ turned.T + data.geom_xpos[geom]
+        corners.append(((at - pos) @ turn - grip) @ frame)
         own = geom_spheres(model, int(geom), 0.04, HELD + 1e-3)
-        centres = own[:, :3] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+        centres = own[:, :3] @ turned.T + data.geom_xpos[geom]
         local = ((centres - pos) @ turn - grip) @ frame
         found.append(np.column_stack([local, own[:, 3]]))
-    return frame, opening, np.concatenate(found)
+    return frame, opening, np.concatenate(found), np.concatenate(corners)

@@ -173,6 +173,10 @@ class HandedBody(Body, Protocol):
         """x, y, z from a hand's grasp point (world axes) and radius of spheres that hold an open hand, m."""
         ...
 
+    def hand_corners(self, fingers: Direction, palm: Direction) -> Float[np.ndarray, "n 3"]:
+        """Corners of the boxes of a gripper's geoms, from its grasp point (world axes), m; none of other hands."""
+        ...
+
     def prepared(self, program: Sequence[Phase]) -> list[Phase]:
         """A program as this body carries it out."""
         ...
@@ -312,6 +316,10 @@ class HoveringBody(_Body):
     def hand_spheres(self, fingers: Direction, palm: Direction) -> Float[np.ndarray, "S 4"]:
         """See `HandedBody.hand_spheres`."""
         return hand_spheres(fingers, palm)
+
+    def hand_corners(self, fingers: Direction, palm: Direction) -> Float[np.ndarray, "n 3"]:
+        """See `HandedBody.hand_corners`."""
+        return np.zeros((0, 3))
 
     def prepared(self, program: Sequence[Phase]) -> list[Phase]:
         """With empty hands that are quick where nothing is touched."""

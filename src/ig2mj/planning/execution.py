@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.host_rotations import rotation_angle
-from ig2mj.planning.bodies import Body, Rows, Senses, goals_of_hand, grip_of, sense
+from ig2mj.planning.bodies import Body, HandedBody, Rows, Senses, goals_of_hand, grip_of, sense
 from ig2mj.planning.phases import REASON_NUMBERS, Base, Phase, Programs, Until
 
 RUNNING, DONE = -1, 0
@@ -26,6 +26,13 @@ SETTLING = 2
 RISEN = 0.03
 """m within which a body is at its height."""
 
+FAR_AWAY = 1e6
+"""m, of the grasp point of a hand that does not act."""
+
+STILL, BLOCKED = 0.004, 4
+"""m in an agent step below which a hand on an arm does not move, and steps of it after which the hand is blocked: a
+controller adds up what is asked of a blocked hand, and a hand that is far behind loses what it then takes hold of."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Carry:
@@ -34,6 +41,7 @@ class Carry:
     Attributes:
       programs: of all worlds. phase: number of the present one. steps: agent steps in it. status: of each world.
       rows: the present phases. rise: m by which bodies are asked to be above their height.
+      grip: m, where the acting hand was. still: agent steps of the present phase in which it has not moved.
     """
 
     programs: Programs
@@ -42,6 +50,8 @@ class Carry:
     status: Int[np.ndarray, "W"]
     rows: Rows
     rise: Float[np.ndarray, "W"]
+    grip: Float[np.ndarray, "W 3"]
+    still: Int[np.ndarray, "W"]
 
     @property
     def running(self) -> Bool[np.ndarray, "W"]:
@@ -58,7 +68,8 @@ def begin(programs: Sequence[Sequence[Phase]]) -> Carry:
     packed = Programs.pack(programs)
     zero = np.zeros(len(programs), np.int32)
     status = np.where(packed.length > 0, RUNNING, DONE).astype(np.int32)
-    return Carry(packed, zero, zero, status, packed.at(zero), np.zeros(len(programs), np.float32))
+    rise, grip = np.zeros(len(programs), np.float32), np.full((len(programs), 3), FAR_AWAY, np.float32)
+    return Carry(packed, zero, zero, status, packed.at(zero), rise, grip, zero)
 
 
 def begin_some(carry: Carry, programs: Mapping[int, Sequence[Phase]]) -> Carry:
@@ -68,10 +79,10 @@ def begin_some(carry: Carry, programs: Mapping[int, Sequence[Phase]]) -> Carry:
     new = np.array(list(programs), np.int64)
     fresh = Programs.pack(list(programs.values()))
     packed = carry.programs.with_rows(new, fresh)
-    phase, steps, status = carry.phase.copy(), carry.steps.copy(), carry.status.copy()
-    phase[new], steps[new] = 0, 0
+    phase, steps, status, still = (a.copy() for a in (carry.phase, carry.steps, carry.status, carry.still))
+    phase[new], steps[new], still[new] = 0, 0, 0
     status[new] = np.where(fresh.length > 0, RUNNING, DONE)
-    return Carry(packed, phase, steps, status, packed.at(phase), carry.rise)
+    return Carry(packed, phase, steps, status, packed.at(phase), carry.rise, carry.grip, still)
 
 
 def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Float[np.ndarray, "W n"], Carry]:
@@ -83,6 +94,10 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     senses = sense(view, agent, body.hands)
     rows = carry.rows
     there, lost = _ended(body, senses, rows), _lost(senses, rows)
+    grip = _acting_grip(body, senses, rows)
+    still = np.where(np.linalg.norm(grip - carry.grip, axis=1) < STILL, carry.still + 1, 0)
+    if isinstance(body, HandedBody) and body.opening is not None:
+        there |= (rows["until"] == Until.TOUCHED) & (still >= BLOCKED)
     there &= carry.steps >= np.where(rows["close"] >= 0, SETTLING, 0)
     late = carry.steps >= rows["limit"]
     waited = late & (rows["until"] == Until.WAITED)
@@ -95,7 +110,8 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     status = np.where(running & (failed > 0), failed, np.where(finished, DONE, carry.status))
     rows = carry.programs.at(phase) if forward.any() else rows
     rise = np.where(np.isnan(rows["rise"]), carry.rise, rows["rise"])
-    new = Carry(carry.programs, phase, np.where(forward, 0, carry.steps + 1), status.astype(np.int32), rows, rise)
+    steps, still = np.where(forward, 0, carry.steps + 1), np.where(forward, 0, still)
+    new = Carry(carry.programs, phase, steps, status.astype(np.int32), rows, rise, grip, still)
     going = new.running
     still = {**rows, "base": np.where(going, rows["base"], Base.STAY), "hand": np.where(going, rows["hand"], -1)}
     still["rise"] = rise
@@ -131,6 +147,16 @@ def _ended(body: Body, senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
         [held, touched, empty, np.zeros(len(there), bool)],
         there,
     )
+
+
+def _acting_grip(body: Body, senses: Senses, rows: Rows) -> Float[np.ndarray, "W 3"]:
+    """Grasp points of the hands that act, m; `FAR_AWAY` where none does."""
+    found = np.full((len(rows["hand"]), 3), FAR_AWAY, np.float32)
+    for number in range(len(body.hands)):
+        mine = rows["hand"] == number
+        if mine.any():
+            found[mine] = grip_of(senses, number, body.grips[number])[mine]
+    return found
 
 
 def _lost(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:

@@ -39,6 +39,10 @@ BITE, SPARE_OPENING, SLICES = 0.02, 0.012, 25
 """m beyond a surface at which the width of an object is looked at, m that open fingers are wider than it, and points
 between the fingers that are looked at."""
 
+GRAZE = 0.003
+"""m by which corners of a gripper may seem to enter what is around the object: a finger that closes on a table instead
+presses the hand off it."""
+
 APART = 0.03
 """m between points of a side."""
 
@@ -161,11 +165,19 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
         return found
     others = set(range(len(tables.object_names))) - {index}
     own = world.planner.obstacles(world.view, others, world.world)
-    return [fits for pose in found if (fits := _between_fingers(own, pose, body.opening)) is not None]
+    placed = [fits for pose in found if (fits := _between_fingers(own, pose, body.opening))]
+    clear = [next((p for p in fits if _fingers_have_room(body, obstacles, p)), None) for fits in placed]
+    return [p for p in clear if p is not None] or [fits[0] for fits in placed]
 
 
-def _between_fingers(own: Obstacles, pose: GraspPose, opening: float) -> GraspPose | None:
-    """A pose with the object in the middle between the fingers of a gripper; None: it is too wide there, or misses.
+def _fingers_have_room(body: HandedBody, obstacles: Obstacles, pose: GraspPose) -> bool:
+    """Whether an open gripper meets nothing but the object at a pose."""
+    return bool((obstacles.distance(body.hand_corners(pose.fingers, pose.palm) + pose.point) > -GRAZE).all())
+
+
+def _between_fingers(own: Obstacles, pose: GraspPose, opening: float) -> list[GraspPose]:
+    """A pose with the object in the middle between the fingers of a gripper, and with it near the one finger and the
+    other, as what lies flat has to be; none: it is too wide there, or misses.
 
     Args:
       own: the object alone. opening: m between the fingers.
@@ -175,11 +187,13 @@ def _between_fingers(own: Obstacles, pose: GraspPose, opening: float) -> GraspPo
     at = pose.at(-BITE) + along[:, None] * pose.fingers
     inside = own.distance(at) < 0.0
     if not inside.any():
-        return None
+        return []
     low, high = float(along[inside].min()), float(along[inside].max())
     if high - low > opening - 2 * SPARE_OPENING:
-        return None
-    return dataclasses.replace(pose, point=pose.point + (low + high) / 2 * pose.fingers)
+        return []
+    aside = (opening - (high - low)) / 2 - SPARE_OPENING
+    shifts = [(low + high) / 2 + s for s in (0.0, aside, -aside)]
+    return [dataclasses.replace(pose, point=pose.point + shift * pose.fingers) for shift in shifts]
 
 
 def _room(
