@@ -158,7 +158,14 @@ def _base_way(self: FreeFloor, start: Point, goal: Point) -> np.ndarray | None:
 
 
 def _random_stances(
-    world: PlannedWorld, hand: int, point: np.ndarray, floor: FreeFloor, away: float, most: int = 10, held: Any = None
+    world: PlannedWorld,
+    hand: int,
+    point: np.ndarray,
+    floor: FreeFloor,
+    away: float,
+    most: int = 10,
+    held: Any = None,
+    before: Any = None,
 ) -> Iterator[Stance]:
     """In place of `ig2mj.planning.stances.stances`."""
     obstacles = world.obstacles()

@@ -28,8 +28,26 @@ def simulation():
         ((("open", "fridge_0"),), "close fridge_0"),
         ((("open", "window_0"),), "close window_0, open window_0"),
         ((("dusty", "plate_0"),), "grasp scrub_brush_0, wipe plate_0 scrub_brush_0"),
+        (
+            (("on_top", "scrub_brush_0", "breakfast_table_0"),),
+            "toggle_on sink_0, grasp scrub_brush_0, soak scrub_brush_0 sink_0",
+        ),
+        (
+            (("on_top", "scrub_brush_0", "breakfast_table_0"), ("soaked", "scrub_brush_0"), ("stained", "plate_0")),
+            "grasp scrub_brush_0, scrub plate_0 scrub_brush_0",
+        ),
+        ((), "grasp hardback_0, place_next_to hardback_0 mug_0"),
+        ((), "grasp mug_0, place_on_floor mug_0 kitchen_0"),
+        (
+            (("open", "fridge_0"), ("inside", "apple_0", "fridge_0")),
+            "close fridge_0, freeze apple_0 fridge_0",
+        ),
+        ((), "push hardback_0 sofa_0"),
     ],
-    ids=["slice", "cook", "on_top", "under", "drawer", "close", "window", "wipe"],
+    ids=[
+        *("slice", "cook", "on_top", "under", "drawer", "close", "window", "wipe"),
+        *("soak", "scrub", "next_to", "on_floor", "freeze", "push"),
+    ],
 )
 def test_fetch_does(simulation, before, requests):
     simulation.reset()
@@ -39,3 +57,12 @@ def test_fetch_does(simulation, before, requests):
     for request in requests.split(", "):
         outcome = simulation.agent.do(*request.split())
         assert outcome.done, f"{request}: {outcome}"
+
+
+def test_fetch_pushes_a_chair_over_the_floor(simulation):
+    simulation.reset()
+    chair = simulation.scene.object_index("straight_chair_0")
+    height = float(simulation.view.object_pos[0, chair, 2])
+    simulation.set_object_pose("straight_chair_0", (0.6, 0.5, height), (1.0, 0.0, 0.0, 0.0))
+    outcome = simulation.agent.do("push", "straight_chair_0", "coffee_table_0")
+    assert outcome.done, outcome

@@ -30,9 +30,9 @@ def train_from_demos(
     from ig2mj.agents.registry import robot_name
     from ig2mj.errors import Ig2mjError, InputError
     from ig2mj.learn.bc import BC, clone
-    from ig2mj.learn.demos import about, load_demos
+    from ig2mj.learn.demos import about, horizon_of_demos, load_demos
     from ig2mj.learn.perception import DEPTH_RANGE, Perception
-    from ig2mj.learn.policies import Policy, depends_of
+    from ig2mj.learn.policies import Policy, depends_of, horizon_on_card
     from ig2mj.learn.train import Run
 
     demos, obs, seed = chosen.demos, chosen.obs, chosen.seed
@@ -66,6 +66,7 @@ def train_from_demos(
         "minutes": round(row["seconds"] / 60, 2),
         "demonstration_steps": int(runs.reward.shape[0]),
         "held_out_loss": row["held_out_loss"],
+        **horizon_on_card({"horizon": settings.horizon or horizon_of_demos(demos)}),
     }
     file = folder / "policy.npz"
     Policy.of(algorithm, learner, depends, made).save(file)

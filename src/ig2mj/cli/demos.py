@@ -32,6 +32,7 @@ def collect(
     split: str = "train",
     pool_size: int = 0,
     doors: Literal["open", "shut"] = "shut",
+    horizon: int = 0,
     object: AddedObjects = (),
     jobs: int = 1,
     cluster: Cluster = None,
@@ -63,6 +64,7 @@ def collect(
       pool_size: number of start states; 0: all of the split, or as many as episodes where they neither ship nor were
         sampled before.
       doors: whether doors between rooms that the task does not name stand open at the start of episodes.
+      horizon: agent steps of an episode; 0: the task's, of the planner as many as its plan may take.
       object: {object}.
       jobs: number of processes, each with its own worlds.
       cluster: run on a Ray cluster: its address, or auto.
@@ -87,6 +89,8 @@ def collect(
         raise UnknownNameError("kind of observation", obs, MODES)
     if episodes < 1 or worlds < 0:
         raise Ig2mjError(f"--episodes {episodes}, --worlds {worlds}: at least one of each is needed")
+    if horizon < 0:
+        raise Ig2mjError(f"--horizon {horizon}: at least 1, or 0 for the task's")
     if not 0 <= (noise or 0.0) < float("inf") or not 0 <= (disturbed or 0.0) <= 1:
         raise Ig2mjError(f"--noise {noise}, --disturbed {disturbed}: 0 or more, and between 0 and 1")
     if jobs < 0:
@@ -101,11 +105,11 @@ def collect(
     common = {"observations": VECTORS, "split": split, "pool_size": count, "objects": object, "doors": doors}
     first = make(env, robot, 1, "native", grasping, **common)
     note_changes(first.scene, object)
-    expert, horizon = expert_of(first), None  # errors before any work
+    expert = expert_of(first)  # errors before any work
     planned = isinstance(expert, PlannedExpert)
     if planned:
         expert(first.reset(seed))  # a goal that cannot become true is refused here
-        horizon = max(first.task.horizon, horizon_for(expert.planned, first.period))
+        horizon = horizon or max(first.task.horizon, horizon_for(expert.planned, first.period))
     first.close()
     usual = (1, 0.05, 0.0) if planned else (8, 0.1, 0.02)
     settings = {
@@ -121,7 +125,7 @@ def collect(
         "disturbed": usual[2] if disturbed is None else disturbed,
         **({"objects": list(object)} if object else {}),
         **({"doors": doors} if doors != "shut" else {}),
-        **({"horizon": horizon} if planned else {}),
+        **({"horizon": horizon} if horizon else {}),
     }
     title = f"demonstrations of {env}"
     starts = {"task": env, "split": split, "count": count, **({"objects": list(object)} if object else {})}

@@ -96,7 +96,7 @@ def run(
     from ig2mj.envs.shared_starts import shared_pool, shipped_states
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.evaluate import evaluation_jobs, summary
-    from ig2mj.learn.policies import Policy, doors_in, looks_of, objects_of, robot_of
+    from ig2mj.learn.policies import Policy, doors_in, horizon_on_card, looks_of, objects_of, robot_of
     from ig2mj.learn.shipped import find_policy
     from ig2mj.tasks.custom.files import refuse_unknown
     from ig2mj.tasks.pools import COUNT
@@ -152,7 +152,7 @@ def run(
     }
     if loaded.card["depends"].get("looks"):
         settings["looks"] = looks_of(loaded)
-    settings |= doors_in(loaded.card["depends"])
+    settings |= {**doors_in(loaded.card["depends"]), **horizon_on_card(loaded.card)}
     if objects:
         settings["objects"] = list(objects)
     states = pool_size or COUNT.get(split, episodes)

@@ -133,11 +133,11 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
     from ig2mj.learn.bc import begin_as_clone
     from ig2mj.learn.best import COUNTED, SUCCESS, Best
     from ig2mj.learn.checkpoints import Checkpoints
-    from ig2mj.learn.demos import load_demos
+    from ig2mj.learn.demos import horizon_of_demos, load_demos
     from ig2mj.learn.device_memory import too_large
     from ig2mj.learn.occlusion.encoder_pretraining import pretrain
     from ig2mj.learn.perception import Perception, depth_range_of
-    from ig2mj.learn.policies import Policy, depends_on, objects_on_card, robot_folder, world_of
+    from ig2mj.learn.policies import Policy, depends_on, horizon_on_card, objects_on_card, robot_folder, world_of
     from ig2mj.learn.run_config import initial_policy, settings_of
     from ig2mj.learn.several_devices import AXIS
     from ig2mj.learn.train import Run, train
@@ -182,6 +182,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
                 objects=chosen.objects,
                 looks=settings.looks,
                 doors=settings.doors,
+                horizon=settings.horizon or (horizon_of_demos(chosen.demos) if chosen.demos is not None else None),
                 **settings.varied,
             )
             note_changes(world.scene, chosen.objects)
@@ -224,6 +225,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
             "scene": world.scene.digest,
             **({"homes": list(world.homes)} if isinstance(world, HomesEnvironment) else {}),
             **robot_folder(world.made_with.get("robot")),
+            **horizon_on_card({"horizon": world.task.horizon}),
             **objects_on_card(world),
             **extra,
         }

@@ -30,7 +30,7 @@ from ig2mj.files.limits import refuse_bomb
 from ig2mj.files.npz import refuse_nonfinite
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.perception import Perception, Seen, blank
-from ig2mj.learn.policies import doors_in, looks_in
+from ig2mj.learn.policies import doors_in, horizon_on_card, looks_in
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import PLAIN
 from ig2mj.tasks.custom.code import IN_FILES
@@ -65,6 +65,12 @@ def about(file: str | os.PathLike) -> tuple[dict[str, Any], dict[str, Space]]:
     """The environment of a recording (`policies.world_of`), and its observations. Raises InputError."""
     with Recording(find_recording(file)) as recording:
         return _about(recording)
+
+
+def horizon_of_demos(file: str | os.PathLike) -> int | None:
+    """Agent steps of the episodes of a recording, at most; None: it does not say so. Raises InputError."""
+    with Recording(find_recording(file)) as recording:
+        return horizon_on_card(recording.header).get("horizon")
 
 
 def _about(recording: Recording) -> tuple[dict[str, Any], dict[str, Space]]:

@@ -104,6 +104,7 @@ def evaluate_job(
     objects: Sequence[str] = (),
     looks: str | None = None,
     doors: str = "shut",
+    horizon: int | None = None,
 ) -> bytes:
     """Episodes from the start states `first` on, as JSON: how each ended, what went wrong, and how long it took until
     the first step was taken ("start_seconds").
@@ -117,7 +118,7 @@ def evaluate_job(
     try:
         keep_pool(shared, task, split, pool_size, objects)
         made = (task, robot, grasping, engine, worlds, tuple(observations), paper_rl, split, pool_size)
-        env, actor = _player(shared["policy"], file, drawn, *made, tuple(objects), looks, doors)
+        env, actor = _player(shared["policy"], file, drawn, *made, tuple(objects), looks, doors, horizon)
     except Ig2mjError as e:
         raise WholeRunError(e) from e
     with progress(f"playing {task} from start state {first}") as report:
@@ -146,6 +147,7 @@ def _player(
     objects: tuple[str, ...],
     looks: str | None,
     doors: str,
+    horizon: int | None,
 ) -> tuple[Environment, Actor]:
     """The environment and its agent, the same in all jobs of an evaluation, so that they are compiled once.
 
@@ -160,6 +162,7 @@ def _player(
         "objects": objects,
         "looks": looks,
         "doors": doors,
+        "horizon": horizon,
     }
     env = make(task, robot, worlds, engine, grasping, **made)
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:

@@ -71,6 +71,13 @@ def doors_in(made_with: Mapping[str, Any]) -> dict[str, str]:
     return {"doors": "open"} if made_with.get("doors") == "open" else {}
 
 
+def horizon_on_card(found: Mapping[str, Any]) -> dict[str, int]:
+    """What a policy's card, or a recording's header, says of episodes: their agent steps, of which `time_left` is
+    observed as a share; nothing where it does not say so."""
+    horizon = found.get("horizon")
+    return {"horizon": int(horizon)} if isinstance(horizon, int | np.integer) and horizon > 0 else {}
+
+
 def looks_in(spaces: Mapping[str, Any], looks: str) -> dict[str, str]:
     """What `world_of` says of how cameras see the home: nothing where observations are no images, or it is plain."""
     return {"looks": looks} if {"rgb", "depth"} & set(spaces) and looks != PLAIN else {}

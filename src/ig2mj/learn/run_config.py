@@ -74,6 +74,7 @@ class RunSettings:
       augment_starts: train on this many start states made of those: every object lies where it does in one, turned as
         in another; 0: on those themselves.
       doors: whether doors between rooms stand "open" or "shut" at the start of episodes.
+      horizon: agent steps of an episode; 0: those of the demonstrations, else the task's.
       relaxed_thresholds: the success thresholds of the paper's experiments.
       homes: "train", or names of homes with commas: worlds are shared out over them; "": the task's own.
       randomize: axes of `ig2mj.Randomize` with commas, or "all"; "": nothing differs between episodes.
@@ -90,6 +91,7 @@ class RunSettings:
     pool_size: int = 0
     augment_starts: int = 0
     doors: str = "shut"
+    horizon: int = 0
     relaxed_thresholds: bool = False
     homes: str = ""
     randomize: str = ""

@@ -12,7 +12,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.clearance import Obstacles
@@ -39,9 +39,9 @@ BITE, SPARE_OPENING, SLICES = 0.02, 0.012, 25
 """m beyond a surface at which the width of an object is looked at, m that open fingers are wider than it, and points
 between the fingers that are looked at."""
 
-GRAZE = 0.003
-"""m by which corners of a gripper may seem to enter what is around the object: a finger that closes on a table instead
-presses the hand off it."""
+GRAZE, SCRAPE = 0.003, 2.0
+"""m by which corners of a gripper may seem to enter what is around the object, and discomfort of entering farther: a
+finger that closes on a table presses the hand off it."""
 
 APART = 0.03
 """m between points of a side."""
@@ -71,6 +71,7 @@ class GraspPose:
       point: of the surface, m. fingers, palm: unit vectors. before: m along -palm from which the hand comes straight.
       burden: how badly the object is held there: far from below its centre of mass, or so low that the hand is in the
         way when it is put down; 0 to 1.
+      scrapes: fingers meet what is around the object, unless the object stops the hand before.
     """
 
     point: Vector
@@ -78,6 +79,7 @@ class GraspPose:
     palm: Vector
     before: float
     burden: float = 0.0
+    scrapes: bool = False
 
     def at(self, away: float) -> Vector:
         """A point above the surface, m along its normal."""
@@ -149,7 +151,12 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     if not points:
         return []
     points, fingers, palms = np.array(points), np.array(fingers), np.array(palms)
-    body = world.body
+    body, which = world.body, np.arange(len(points))
+    if body.opening is not None:
+        others = set(range(len(tables.object_names))) - {index}
+        own = world.planner.obstacles(world.view, others, world.world)
+        which, points = _between_fingers(own, points, fingers, palms, body.opening)
+        fingers, palms = fingers[which], palms[which]
     before = np.where(_room(body, obstacles, points, fingers, palms, 0.0, AT_OBJECT), 0.0, -1.0)
     for away in BEFORE:
         still = np.flatnonzero(before == 0.0)
@@ -157,43 +164,54 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     lever = world.mass(name) * GRAVITY * np.linalg.norm((points - centre)[:, :2], axis=1)
     low = (points[:, 2] < corners[:, 2].min() + LOW) & (np.abs(palms[:, 2]) < UPRIGHT)
     burden = np.minimum(lever / MOST_TORQUE, 1.0) + low
-    found = [
-        GraspPose(points[k], fingers[k], palms[k], float(before[k]), min(float(burden[k]), 1.0))
-        for k in np.flatnonzero(before > 0)
+    good = np.flatnonzero(before > 0)
+    scrapes = ~_fingers_have_room(body, obstacles, points[good], fingers[good], palms[good])
+    good, scrapes = (a[np.lexsort((np.arange(len(good)), scrapes, which[good]))] for a in (good, scrapes))
+    first = np.unique(which[good], return_index=True)[1]  # of poses that differ by where the fingers are
+    return [
+        GraspPose(points[k], fingers[k], palms[k], float(before[k]), min(float(burden[k]), 1.0), bool(s))
+        for k, s in zip(good[first], scrapes[first], strict=True)
     ]
-    if body.opening is None:
-        return found
-    others = set(range(len(tables.object_names))) - {index}
-    own = world.planner.obstacles(world.view, others, world.world)
-    placed = [fits for pose in found if (fits := _between_fingers(own, pose, body.opening))]
-    clear = [next((p for p in fits if _fingers_have_room(body, obstacles, p)), None) for fits in placed]
-    return [p for p in clear if p is not None] or [fits[0] for fits in placed]
 
 
-def _fingers_have_room(body: HandedBody, obstacles: Obstacles, pose: GraspPose) -> bool:
-    """Whether an open gripper meets nothing but the object at a pose."""
-    return bool((obstacles.distance(body.hand_corners(pose.fingers, pose.palm) + pose.point) > -GRAZE).all())
+def _fingers_have_room(
+    body: HandedBody,
+    obstacles: Obstacles,
+    points: Float[np.ndarray, "N 3"],
+    fingers: Float[np.ndarray, "N 3"],
+    palms: Float[np.ndarray, "N 3"],
+) -> Bool[np.ndarray, "N"]:
+    """Whether open grippers meet nothing but the object at some poses; other hands do."""
+    if not len(points) or body.opening is None:
+        return np.ones(len(points), bool)
+    corners = np.stack([body.hand_corners(f, p) for f, p in zip(fingers, palms, strict=True)]) + points[:, None]
+    return (obstacles.distance(corners.reshape(-1, 3)).reshape(corners.shape[:2]) > -GRAZE).all(1)
 
 
-def _between_fingers(own: Obstacles, pose: GraspPose, opening: float) -> list[GraspPose]:
-    """A pose with the object in the middle between the fingers of a gripper, and with it near the one finger and the
-    other, as what lies flat has to be; none: it is too wide there, or misses.
+def _between_fingers(
+    own: Obstacles,
+    points: Float[np.ndarray, "N 3"],
+    fingers: Float[np.ndarray, "N 3"],
+    palms: Float[np.ndarray, "N 3"],
+    opening: float,
+) -> tuple[Int[np.ndarray, "M"], Float[np.ndarray, "M 3"]]:
+    """Poses with the object between the fingers of a gripper: numbers of those from which they come, and points with
+    the object in the middle, and near the one finger and the other, as what lies flat has to be. Poses in which the
+    object is too wide, or misses the fingers, have none.
 
     Args:
       own: the object alone. opening: m between the fingers.
     """
-    half = opening / 2
-    along = np.linspace(-half, half, SLICES)
-    at = pose.at(-BITE) + along[:, None] * pose.fingers
-    inside = own.distance(at) < 0.0
-    if not inside.any():
-        return []
-    low, high = float(along[inside].min()), float(along[inside].max())
-    if high - low > opening - 2 * SPARE_OPENING:
-        return []
-    aside = (opening - (high - low)) / 2 - SPARE_OPENING
-    shifts = [(low + high) / 2 + s for s in (0.0, aside, -aside)]
-    return [dataclasses.replace(pose, point=pose.point + shift * pose.fingers) for shift in shifts]
+    along = np.linspace(-opening / 2, opening / 2, SLICES)
+    at = (points + BITE * palms)[:, None] + along[:, None] * fingers[:, None]
+    inside = own.distance(at.reshape(-1, 3)).reshape(at.shape[:2]) < 0.0
+    low = np.where(inside, along, opening).min(1)
+    high = np.where(inside, along, -opening).max(1)
+    fits = np.flatnonzero((high >= low) & (high - low <= opening - 2 * SPARE_OPENING))
+    middle, aside = (low + high)[fits] / 2, (opening - (high - low)[fits]) / 2 - SPARE_OPENING
+    shifts = middle[:, None] + aside[:, None] * np.array([0.0, 1.0, -1.0])
+    moved = points[fits, None] + shifts[..., None] * fingers[fits, None]
+    return np.repeat(fits, 3), moved.reshape(-1, 3)
 
 
 def _room(
@@ -218,6 +236,7 @@ def ordered(poses: Sequence[GraspPose], yaw: float, on_arm: bool = False) -> lis
     """The most comfortable first, for a robot that looks along `yaw`, rad. on_arm: its hand is on an arm."""
 
     def cost(pose: GraspPose) -> float:
-        return pose.discomfort(yaw, on_arm) + (0.2 if pose.before < BEFORE[0] else 0.0) + BURDEN * pose.burden
+        narrow = 0.2 if pose.before < BEFORE[0] else 0.0
+        return pose.discomfort(yaw, on_arm) + narrow + BURDEN * pose.burden + SCRAPE * pose.scrapes
 
     return sorted(poses, key=cost)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp, is_graspable
 from ig2mj.planning.moves import (
@@ -71,7 +72,7 @@ def push(world: PlannedWorld, step: Step) -> Primitive:
         if reason := (yield from go(world, stance)):
             failed += 1
             continue
-        plan = functools.partial(_program, world, name, other, hand, point, direction)
+        plan = functools.partial(_program, world, name, other, hand, point, direction, failed)
         program = yield from from_home(world, hand, plan)
         if not program:
             reason, detail, failed = "no_path", f"the hand has no path to {name}", failed + 1
@@ -115,16 +116,18 @@ def _plan(world: PlannedWorld, name: str, other: str, hand: int, passed: int) ->
                 continue
             point = start + hit * way
             end = point + min(gap, STROKE) * way
-            for stance in stances(world, hand, point, floor, AWAY, STANCES):
-                if world.reaches(hand, stance, end):
+            before = None if world.body.opening is None else (point, -way)  # a gripper points to where its robot looks
+            for stance in stances(world, hand, point, floor, AWAY, STANCES, before=before):
+                if world.reaches(hand, stance, end) and points_ahead(world, way, stance.yaw):
                     yield stance, point, way
 
     def has_way(candidate: tuple[Stance, Vector, Vector], search: bool) -> bool:
         nonlocal seen
         stance, point, way = candidate
-        spheres, goal = world.spheres(UP, way), point - BEHIND * way
+        fingers = _fingers(world, way)
+        spheres, goal = world.spheres(fingers, way), point - BEHIND * way
         entries = [-way, UP, -ahead(stance.yaw)]
-        follows = world.follows(hand, world.body.turned(hand, UP, way), obstacles, stance)
+        follows = world.follows(hand, world.body.turned(hand, fingers, way), obstacles, stance)
         rests = world.resting(hand, stance)
         found = hand_path(obstacles, spheres, rests, goal, entries, search=search, follows=follows) is not None
         seen += found
@@ -133,17 +136,24 @@ def _plan(world: PlannedWorld, name: str, other: str, hand: int, passed: int) ->
     return first_way(candidates(), has_way, len(SIDES) * STANCES)
 
 
-def _program(world: PlannedWorld, name: str, other: str, hand: int, point: Vector, way: Vector) -> Program:
-    """Goes behind the face, pushes up to a stroke, and goes back."""
+def _fingers(world: PlannedWorld, way: Vector) -> Vector:
+    """Where the fingers of a hand point that pushes along `way`: up; those of a gripper lie level."""
+    return UP if world.body.opening is None else np.cross(UP, way)
+
+
+def _program(world: PlannedWorld, name: str, other: str, hand: int, point: Vector, way: Vector, failed: int) -> Program:
+    """Goes behind the face, pushes up to a stroke, and goes back. `failed`: pushes that moved nothing: boxes may touch
+    where the objects do not, so the hand goes farther."""
     _, gap = _gap(world, name, other)
-    quat, start = world.body.turned(hand, UP, way), point - BEHIND * way
+    fingers = _fingers(world, way)
+    quat, start = world.body.turned(hand, fingers, way), point - BEHIND * way
     entries = [-way, UP, -ahead(world.base[1])]
-    obstacles, spheres = world.obstacles(), world.spheres(UP, way)
+    obstacles, spheres = world.obstacles(), world.spheres(fingers, way)
     follows = world.follows(hand, quat, obstacles)
     found = hand_path(obstacles, spheres, world.grip(hand), start, entries, search=True, follows=follows)
     if found is None:
         return []
-    end = point + (min(gap, STROKE) + PRESS) * way
+    end = point + (min(gap, STROKE) + (1 + failed) * PRESS) * way
     return [
         *travel(hand, found, quat),
         Phase(hand=hand, pos=vector3(end), quat=quat, close=False, tolerance=0.02, limit=40, after="", speed=SLOW),

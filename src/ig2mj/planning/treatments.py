@@ -71,6 +71,7 @@ def _hold_at(
     Args:
       holds: as the object is held now.
     """
+    missed = set[tuple[tuple[float, float], int]]()
     for _ in range(ATTEMPTS):
         obstacles, floor, now = world.obstacles([name]), world.floor(), world.base[1]
 
@@ -78,7 +79,8 @@ def _hold_at(
             for hold in holds():
                 held = about_vertical(-now) @ hold.offset
                 for stance in stances(world, hand, hold.point, floor, AWAY, STANCES, held):
-                    yield stance, hold
+                    if (stance.xy, hold.number) not in missed:
+                        yield stance, hold
 
         def aim(stance: Stance, hold: _Hold, now=now) -> tuple[Vector, Rotation]:
             turn = about_vertical(stance.yaw - now)
@@ -96,7 +98,7 @@ def _hold_at(
             follows = world.follows(hand, world.turned_hand(hand, turned), standing, stance)
             return hand_path(standing, spheres, start, target, back, search=search, follows=follows) is not None
 
-        found = first_way(candidates(), has_way, WAYS)
+        found = first_way(candidates(), has_way, WAYS if world.body.opening is None else ARM_WAYS)
         if found is None:
             return "no_path", [], -1
         stance, hold = found
@@ -110,6 +112,7 @@ def _hold_at(
             quat, keeps = world.turned_hand(hand, turned), world.index(name)
             reason = yield [*turn_at(world, hand, start, quat, keeps), *travel(hand, way, quat, keeps=keeps)]
             return reason, way, hold.number
+        missed.add((stance.xy, hold.number))
     return "no_path", [], -1
 
 
@@ -186,8 +189,8 @@ PARTS = (0.0, 0.6, 0.85)
 PITCHES, COLUMN = (0.0, 0.5, 0.9, 1.3), 0.03
 """rad by which what is held below a tap points down ahead of the hand; m about a part within which drops meet it."""
 
-STANCES, WAYS = 4, 60
-"""Stances for each point, and ways of a hand that are looked for, at most."""
+STANCES, WAYS, ARM_WAYS = 4, 60, 240
+"""Stances for each point, and ways of a hand that are looked for, at most: of one that floats, and of one on an arm."""
 
 
 def soak(world: PlannedWorld, step: Step) -> Primitive:
