@@ -19,9 +19,9 @@ from small_recordings import write_recording
 from ig2mj.demos import Recording
 from ig2mj.errors import InputError
 from ig2mj.learn.bc import BC, BCConfig, begin_as_clone, clone
-from ig2mj.learn.demos import about, load_demos
+from ig2mj.learn.demos import about, horizon_of_demos, load_demos
 from ig2mj.learn.perception import Perception
-from ig2mj.learn.policies import Policy, depends_of, world_of
+from ig2mj.learn.policies import Policy, depends_of, horizon_on_card, world_of
 from ig2mj.learn.sac import SAC, SACConfig
 from ig2mj.learn.train import Run, train
 
@@ -51,6 +51,12 @@ def test_complete_runs_are_read_one_after_the_other(recorded):
     vector = np.asarray(demos.seen.vector)
     assert np.asarray(demos.label) == pytest.approx(np.clip(10 * (vector[:, 2:] - vector[:, :2]), -1, 1), abs=1e-5)
     assert not np.allclose(demos.label, demos.action)
+
+
+def test_a_card_says_how_long_the_episodes_of_demonstrations_were(recorded):
+    assert horizon_of_demos(recorded[1]) is None, "this file does not say so"
+    assert horizon_of_demos("SlicingFruit") == 200
+    assert horizon_on_card({"horizon": 600}) == {"horizon": 600} and horizon_on_card({"task": "mine"}) == {}
 
 
 @pytest.mark.slow

@@ -219,7 +219,8 @@ class _Body:
 
 
 class WheeledBody(_Body):
-    """A base on two driven wheels: it turns on the spot and drives forwards. Its hands stay as they are."""
+    """A base on two driven wheels: it turns on the spot and drives forwards, in a straight shift backwards, too. Its
+    hands stay as they are."""
 
     sideways = False
 
@@ -228,13 +229,17 @@ class WheeledBody(_Body):
         forward, turn = self._places("forward", "turn_left")
         offset = rows["xy"] - senses.base_pos[:, :2]
         apart = np.linalg.norm(offset, axis=1)
-        drives = (rows["base"] == Base.DRIVE) | (rows["base"] == Base.SHIFT)
-        heading = np.where(drives, np.arctan2(offset[:, 1], offset[:, 0]), rows["yaw"])
+        arrived = (rows["base"] == Base.SHIFT) & (apart < rows["tolerance"])  # what is left is to turn
+        drives = (rows["base"] == Base.DRIVE) | ((rows["base"] == Base.SHIFT) & ~arrived)
+        way = np.arctan2(offset[:, 1], offset[:, 0])
+        back = (rows["base"] == Base.SHIFT) & drives & (np.cos(way - senses.yaw) < 0.0)
+        heading = np.where(drives, way + np.pi * back, rows["yaw"])
         left = _wrapped(heading - senses.yaw)
         acts = rows["base"] != Base.STAY
         action[:, turn] = np.where(acts, np.clip(GAIN * left, -MOST, MOST), 0.0)
         ahead = drives & (np.abs(left) < AHEAD)
-        action[:, forward] = np.where(ahead, np.clip(GAIN * apart, 0.0, MOST) * np.cos(left), 0.0)
+        speed = np.clip(GAIN * apart, 0.0, MOST) * np.cos(left)
+        action[:, forward] = np.where(ahead, np.where(back, -speed, speed), 0.0)
         return action
 
 

@@ -36,6 +36,9 @@ STEP = 0.1
 """m between stances at which what is held is checked."""
 
 
+ASIDE = 0.05
+"""m to the side of a base on wheels up to which it goes to a point without turning much."""
+
 QUICK = 0.12
 """m in an agent step of a base whose hands are empty."""
 
@@ -77,7 +80,14 @@ def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
         return "no_path" if way is None else (yield [*before, *drive(way, stance.yaw, QUICK), *last])
     if tucked := tuck(world):
         yield tucked
-    if apart < 0.3 and turned < 0.3 and clear_with_held(world, _between(Stance((here[0], here[1]), yaw), stance)):
+    aside = abs(float(np.array([-np.sin(yaw), np.cos(yaw)]) @ np.subtract(stance.xy, here)))
+    straight = world.body.sideways or aside < ASIDE
+    if (
+        apart < 0.3
+        and turned < 0.3
+        and straight
+        and clear_with_held(world, _between(Stance((here[0], here[1]), yaw), stance))
+    ):
         return (yield [shift(stance), *last])
     turning = world.floor(holding=True)
     start = _backed(world, Stance((float(here[0]), float(here[1])), yaw), standing, turning)

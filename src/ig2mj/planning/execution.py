@@ -26,12 +26,9 @@ SETTLING = 2
 RISEN = 0.03
 """m within which a body is at its height."""
 
-FAR_AWAY = 1e6
-"""m, of the grasp point of a hand that does not act."""
-
-STILL, BLOCKED = 0.004, 4
-"""m in an agent step below which a hand on an arm does not move, and steps of it after which the hand is blocked: a
-controller adds up what is asked of a blocked hand, and a hand that is far behind loses what it then takes hold of."""
+STILL, STILL_TURNED, BLOCKED = 0.004, 0.02, 4
+"""m and rad in an agent step below which a hand on an arm does not move, and steps of it after which the hand is
+blocked: a controller adds up what is asked of a blocked hand, and a hand that is far behind loses what it holds."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -41,7 +38,8 @@ class Carry:
     Attributes:
       programs: of all worlds. phase: number of the present one. steps: agent steps in it. status: of each world.
       rows: the present phases. rise: m by which bodies are asked to be above their height.
-      grip: m, where the acting hand was. still: agent steps of the present phase in which it has not moved.
+      hand_pos, hand_quat: where hands were. still: agent steps of the present phase in which the acting one has not
+        moved.
     """
 
     programs: Programs
@@ -50,7 +48,8 @@ class Carry:
     status: Int[np.ndarray, "W"]
     rows: Rows
     rise: Float[np.ndarray, "W"]
-    grip: Float[np.ndarray, "W 3"]
+    hand_pos: Float[np.ndarray, "W H 3"] | None
+    hand_quat: Float[np.ndarray, "W H 4"] | None
     still: Int[np.ndarray, "W"]
 
     @property
@@ -68,8 +67,8 @@ def begin(programs: Sequence[Sequence[Phase]]) -> Carry:
     packed = Programs.pack(programs)
     zero = np.zeros(len(programs), np.int32)
     status = np.where(packed.length > 0, RUNNING, DONE).astype(np.int32)
-    rise, grip = np.zeros(len(programs), np.float32), np.full((len(programs), 3), FAR_AWAY, np.float32)
-    return Carry(packed, zero, zero, status, packed.at(zero), rise, grip, zero)
+    rise = np.zeros(len(programs), np.float32)
+    return Carry(packed, zero, zero, status, packed.at(zero), rise, None, None, zero)
 
 
 def begin_some(carry: Carry, programs: Mapping[int, Sequence[Phase]]) -> Carry:
@@ -82,7 +81,7 @@ def begin_some(carry: Carry, programs: Mapping[int, Sequence[Phase]]) -> Carry:
     phase, steps, status, still = (a.copy() for a in (carry.phase, carry.steps, carry.status, carry.still))
     phase[new], steps[new], still[new] = 0, 0, 0
     status[new] = np.where(fresh.length > 0, RUNNING, DONE)
-    return Carry(packed, phase, steps, status, packed.at(phase), carry.rise, carry.grip, still)
+    return Carry(packed, phase, steps, status, packed.at(phase), carry.rise, carry.hand_pos, carry.hand_quat, still)
 
 
 def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Float[np.ndarray, "W n"], Carry]:
@@ -94,10 +93,10 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     senses = sense(view, agent, body.hands)
     rows = carry.rows
     there, lost = _ended(body, senses, rows), _lost(senses, rows)
-    grip = _acting_grip(body, senses, rows)
-    still = np.where(np.linalg.norm(grip - carry.grip, axis=1) < STILL, carry.still + 1, 0)
+    still = np.where(_hand_is_still(carry, senses, rows), carry.still + 1, 0)
     if isinstance(body, HandedBody) and body.opening is not None:
-        there |= (rows["until"] == Until.TOUCHED) & (still >= BLOCKED)
+        ends = (rows["until"] == Until.TOUCHED) | ((rows["until"] == Until.THERE) & (rows["after"] == 0))
+        there |= ends & (rows["moves"] > 0) & (still >= BLOCKED)
     there &= carry.steps >= np.where(rows["close"] >= 0, SETTLING, 0)
     late = carry.steps >= rows["limit"]
     waited = late & (rows["until"] == Until.WAITED)
@@ -111,7 +110,8 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     rows = carry.programs.at(phase) if forward.any() else rows
     rise = np.where(np.isnan(rows["rise"]), carry.rise, rows["rise"])
     steps, still = np.where(forward, 0, carry.steps + 1), np.where(forward, 0, still)
-    new = Carry(carry.programs, phase, steps, status.astype(np.int32), rows, rise, grip, still)
+    hands = senses.hand_pos, senses.hand_quat
+    new = Carry(carry.programs, phase, steps, status.astype(np.int32), rows, rise, *hands, still)
     going = new.running
     still = {**rows, "base": np.where(going, rows["base"], Base.STAY), "hand": np.where(going, rows["hand"], -1)}
     still["rise"] = rise
@@ -149,14 +149,14 @@ def _ended(body: Body, senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
     )
 
 
-def _acting_grip(body: Body, senses: Senses, rows: Rows) -> Float[np.ndarray, "W 3"]:
-    """Grasp points of the hands that act, m; `FAR_AWAY` where none does."""
-    found = np.full((len(rows["hand"]), 3), FAR_AWAY, np.float32)
-    for number in range(len(body.hands)):
-        mine = rows["hand"] == number
-        if mine.any():
-            found[mine] = grip_of(senses, number, body.grips[number])[mine]
-    return found
+def _hand_is_still(carry: Carry, senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
+    """Worlds in which the acting hand neither moves nor turns."""
+    if carry.hand_pos is None or carry.hand_quat is None or not senses.hand_pos.shape[1]:
+        return np.zeros(len(rows["hand"]), bool)
+    world, hand = np.arange(len(rows["hand"])), np.maximum(rows["hand"], 0)
+    moved = np.linalg.norm((senses.hand_pos - carry.hand_pos)[world, hand], axis=1)
+    turned = np.asarray(rotation_angle(senses.hand_quat[world, hand], carry.hand_quat[world, hand]))
+    return (rows["hand"] >= 0) & (moved < STILL) & (turned < STILL_TURNED)
 
 
 def _lost(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:

@@ -39,9 +39,9 @@ BITE, SPARE_OPENING, SLICES = 0.02, 0.012, 25
 """m beyond a surface at which the width of an object is looked at, m that open fingers are wider than it, and points
 between the fingers that are looked at."""
 
-GRAZE, SCRAPE = 0.003, 2.0
-"""m by which corners of a gripper may seem to enter what is around the object, and discomfort of entering farther: a
-finger that closes on a table presses the hand off it."""
+GRAZE, SCRAPE = 0.025, 2.0
+"""m by which fingertips may seem to enter what is around the object, which stops them, and discomfort of entering
+farther: a finger that closes on a table presses the hand off it."""
 
 APART = 0.03
 """m between points of a side."""
