@@ -79,9 +79,9 @@ def _hold_at(
             for hold in holds():
                 held = about_vertical(-now) @ hold.offset
                 here = world.stance  # a base on wheels that stands near enough stays there
-                if not world.body.sideways and world.reaches(hand, here, hold.point + hold.offset):
-                    if (here.xy, hold.number) not in missed:
-                        yield here, hold
+                near = not world.body.sideways and world.reaches(hand, here, hold.point + hold.offset)
+                if near and (here.xy, hold.number) not in missed:
+                    yield here, hold
                 for stance in stances(world, hand, hold.point, floor, AWAY, STANCES, held):
                     if (stance.xy, hold.number) not in missed:
                         yield stance, hold
