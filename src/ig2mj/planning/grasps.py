@@ -185,7 +185,8 @@ def _fingers_have_room(
     if not len(points) or body.opening is None:
         return np.ones(len(points), bool)
     corners = np.stack([body.hand_corners(f, p) for f, p in zip(fingers, palms, strict=True)]) + points[:, None]
-    return (obstacles.distance(corners.reshape(-1, 3)).reshape(corners.shape[:2]) > -GRAZE).all(1)
+    distance = obstacles.distance(corners.reshape(-1, 3)).reshape(corners.shape[:2])
+    return np.all(distance > -GRAZE, axis=1)
 
 
 def _between_fingers(

@@ -281,8 +281,8 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
         if reason:
             continue
         keeps, before = world.index(knife), world.grip(hand)
-        tolerance, limit, speed = (0.005, 2, CUT_STEP) if world.body.opening is None else ARM_CUT
-        for depth in np.arange(CUT_ABOVE - CUT_STEP, -CUT_DEPTH - CUT_STEP / 2, -CUT_STEP):  # no farther than the cut
+        down, tolerance, limit, speed = CUT if world.body.opening is None else ARM_CUT
+        for depth in np.arange(CUT_ABOVE - down, -CUT_DEPTH - down / 2, -down):  # no farther than the cut
             blade = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
             pressed = vector3(top + depth * UP - blade + world.grip(hand))
             reason = yield [
@@ -298,8 +298,9 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
     return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
 
-ARM_CUT = (0.01, 10, 0.04)
-"""m within which a hand on an arm is there, agent steps that it has, and m in each: in every step down of a blade."""
+CUT_ABOVE, CUT_DEPTH = 0.08, 0.04
+"""m above what is cut at which the blade comes to it, and below its top that it goes for."""
 
-CUT_ABOVE, CUT_DEPTH, CUT_STEP = 0.08, 0.04, 0.01
-"""m above what is cut at which the blade comes to it, below its top that it goes for, and between looks at it."""
+CUT, ARM_CUT = (0.01, 0.005, 2, 0.01), (0.02, 0.01, 10, 0.04)
+"""Steps in which a blade goes down, between looks at what is cut, of a hand that floats and of one on an arm: m of a
+step, m within which the hand is there, agent steps that it has, and m in each."""
