@@ -88,6 +88,19 @@ def test_detached_it_falls_and_is_not_attached_again_until_it_was_apart(simulati
     assert not simulation.predicate("attached", "lamp", "board") and _height(simulation, "lamp") < 0.2
 
 
+@pytest.mark.parametrize(
+    "place, holds", [("0.3,0,0.02", True), pytest.param("-0.3,0,0.02", False, marks=pytest.mark.slow)]
+)
+def test_a_pair_with_a_place_is_attached_there_and_nowhere_else(folder, place, holds):
+    simulation = Simulation(ig2mj.load_scene(folder, objects=[f"with:attached:lamp>board@{place}"]))
+    for _ in range(12):
+        simulation.step()
+    assert simulation.predicate("attached", "lamp", "board") == holds, "the lamp falls onto the edge at x = 0.3"
+    assert simulation.set_predicate("attached", "lamp", "board", seed=1)
+    x = float(np.asarray(simulation.view.object_com)[0, simulation.scene.object_index("lamp"), 0])
+    assert x == pytest.approx(0.34 if holds else -0.3, abs=0.08)
+
+
 def test_setting_attaches_it_somewhere_on_the_other(simulation):
     assert simulation.set_predicate("attached", "lamp", "paper", seed=3)
     assert simulation.predicate("attached", "lamp", "paper") and not simulation.predicate("attached", "lamp", "board")
@@ -142,6 +155,8 @@ def test_scenes_that_ask_for_nothing_have_none_of_it(folder):
         ("with:attached:lamp", "with:on_fire"),
         ("with:attached:lamp>lamp", "itself"),
         ("with:attached:board>lamp", "fixed"),
+        ("with:attached:lamp>board@1,2", "three numbers"),
+        ("with:attached:lamp>board@a,b,c", "three numbers"),
         ("with:broken:x", "with:on_fire"),
     ],
 )

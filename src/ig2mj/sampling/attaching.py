@@ -55,9 +55,9 @@ def attach(
         _switch(query, model, states)
         return states
     before = query.save()
-    touching = bool(np.asarray(query.view.touching)[0, child, parent])
+    touching = bool(np.asarray(query.view.touching)[0, child, parent]) and _is_there(joints, query, number)
     for _ in range(TRIES):
-        if touching or _put_against(query, model, child, parent, rng):
+        if touching or (_put_against(query, model, number, rng) and _is_there(joints, query, number)):
             made = attached.set_attached(model, states, number, True, query.view)
             _switch(query, model, made)
             settled = query.settle()
@@ -69,18 +69,30 @@ def attach(
     return None
 
 
-def _put_against(query: SceneQuery, model: StateModel, child: int, parent: int, rng: np.random.Generator) -> bool:
-    """Puts an object against a point of another's surface, turned as it is; whether they touch there."""
-    view = query.view
+def _is_there(joints: attached.Joints, query: SceneQuery, number: int) -> bool:
+    return bool(np.asarray(attached.at_place(joints, query.view))[0, number])
+
+
+def _put_against(query: SceneQuery, model: StateModel, number: int, rng: np.random.Generator) -> bool:
+    """Puts an object against a point of another's surface, that at the pair's place if it has one, turned as it is;
+    whether they touch there."""
+    view, joints = query.view, attached.of(model)
+    child, parent = int(joints.child[number]), int(joints.parent[number])
     places = sample_places(model.tables, view, parent, rng)
     valid = np.flatnonzero(np.asarray(places.valid).reshape(-1))
     if not len(valid):
         return False
-    n = int(valid[rng.integers(len(valid))])
-    body = int(np.asarray(places.body).reshape(-1)[n])
-    point, normal = (np.asarray(f).reshape(-1, 3)[n] for f in (places.pos, places.normal))
-    turn = _matrix(np.asarray(view.body_quat)[0, body])
-    point, normal = np.asarray(view.body_pos)[0, body] + turn @ point, turn @ normal
+    bodies = np.asarray(places.body).reshape(-1)[valid]
+    points, normals = (np.asarray(f).reshape(-1, 3)[valid] for f in (places.pos, places.normal))
+    turns = [_matrix(np.asarray(view.body_quat)[0, body]) for body in bodies]
+    points = np.array([np.asarray(view.body_pos)[0, b] + t @ p for b, t, p in zip(bodies, turns, points, strict=True)])
+    place = np.asarray(attached.places(joints, view))[0, number]
+    if np.isnan(place[0]):
+        n = int(rng.integers(len(valid)))
+        point = points[n]
+    else:
+        n, point = int(np.linalg.norm(points - place, axis=1).argmin()), place
+    normal = turns[n] @ normals[n]
     low, high = np.asarray(view.aabb_low)[0, child], np.asarray(view.aabb_high)[0, child]
     reach = float(np.abs(normal) @ (high - low) / 2)
     offset = np.asarray(view.object_pos)[0, child] - (low + high) / 2

@@ -3,6 +3,7 @@
     with:on_fire                          flammable objects burn
     with:broken                           breakable objects break
     with:attached:lamp_bulb_0>lamp_0      the first object can be attached to the second
+    with:attached:lamp_bulb_0>lamp_0@0,0,0.3   only at a place, m, in the frame of the second's main body
 
 A scene that asks for none has no arrays, programs or constraints for them. Each pair that can be attached is an
 equality constraint, compiled switched off: a weld between the main bodies.
@@ -10,6 +11,7 @@ equality constraint, compiled switched off: a weld between the main bodies.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -22,7 +24,7 @@ from ig2mj.scene.manifest import Manifest
 PREFIX = "with:"
 ON_FIRE, BROKEN, ATTACHED = "on_fire", "broken", "attached"
 EXTRAS = (ON_FIRE, BROKEN, ATTACHED)
-FORM = "with:on_fire, with:broken or with:attached:CHILD>PARENT"
+FORM = "with:on_fire, with:broken or with:attached:CHILD>PARENT[@X,Y,Z]"
 
 TIME_CONSTANT = 0.02
 """s in which a joint takes back what it was pulled apart, MuJoCo's default."""
@@ -33,10 +35,11 @@ IMPEDANCE = (0.91, 0.91, 0.001)
 
 
 class Pair(NamedTuple):
-    """What can be attached to what, by name."""
+    """What can be attached to what, by name, and where: m, frame of the parent's main body; None: anywhere."""
 
     child: str
     parent: str
+    place: tuple[float, float, float] | None = None
 
 
 def is_extra(requested: object) -> bool:
@@ -67,12 +70,23 @@ def attached_as_text(child: str, parent: str) -> str:
 
 def _checked(extra: str) -> str:
     name, colon, pair = extra.partition(":")
-    child, arrow, parent = pair.partition(">")
+    child, arrow, where = pair.partition(">")
+    parent, at, place = where.partition("@")
     if name not in EXTRAS or (name == ATTACHED) != bool(child and arrow and parent) or (name != ATTACHED and colon):
         raise Ig2mjError(f"'{PREFIX}{extra}' is no further state: {FORM}")
     if name == ATTACHED and child == parent:
         raise Ig2mjError(f"'{PREFIX}{extra}': '{child}' cannot be attached to itself")
+    if at and _place(place) is None:
+        raise Ig2mjError(f"'{PREFIX}{extra}': a place is three numbers, X,Y,Z, in metres")
     return extra
+
+
+def _place(text: str) -> tuple[float, float, float] | None:
+    try:
+        x, y, z = (float(number) for number in text.split(","))
+    except ValueError:
+        return None
+    return (x, y, z) if all(map(math.isfinite, (x, y, z))) else None
 
 
 def names_of(extras: Sequence[str]) -> tuple[str, ...]:
@@ -82,9 +96,13 @@ def names_of(extras: Sequence[str]) -> tuple[str, ...]:
 
 
 def pairs_of(extras: Sequence[str]) -> list[Pair]:
-    """What can be attached to what."""
+    """What can be attached to what. A pair that is named twice has the place that is named last."""
     own = [extra.removeprefix(f"{ATTACHED}:") for extra in extras if extra.startswith(f"{ATTACHED}:")]
-    return [Pair(child, parent) for child, _, parent in (pair.partition(">") for pair in dict.fromkeys(own))]
+    found: dict[tuple[str, str], Pair] = {}
+    for child, _, where in (pair.partition(">") for pair in own):
+        parent, _, place = where.partition("@")
+        found[child, parent] = Pair(child, parent, _place(place))
+    return list(found.values())
 
 
 def joint_name(child: str, parent: str) -> str:
@@ -99,7 +117,7 @@ def add_joints(spec: mujoco.MjSpec, manifest: Manifest) -> None:
       UnknownNameError: the scene has no such object. Ig2mjError: a child is fixed.
     """
     entries = {o.name: o for o in manifest.objects}
-    for child, parent in pairs_of(manifest.extras):
+    for child, parent, _ in pairs_of(manifest.extras):
         for name in (child, parent):
             if name not in entries:
                 raise UnknownNameError("object", name, entries)

@@ -141,7 +141,7 @@ class Scene:
             insides = [(o.name, o.inside) for o in self.manifest.objects if o.inside is not None]
             hashed.update(msgspec.json.encode([self.substances, insides]))
         if pairs := pairs_of(self.manifest.extras):
-            hashed.update(msgspec.json.encode(pairs))
+            hashed.update(msgspec.json.encode([p if p.place else (p.child, p.parent) for p in pairs]))
         return _known_digests().get(hashed.hexdigest(), hashed.hexdigest())
 
     @functools.cached_property
@@ -252,7 +252,7 @@ def load_scene(
         are loose at their place unless they were converted as fixed, those of the library that ships are fixed for
         good; "fixed:" and "loose:" after the "@" say which. "remove:NAME" and "replace:NAME=MODEL" stand for the
         arguments below. "with:on_fire", "with:broken" and
-        "with:attached:CHILD>PARENT" ask for further states (`ig2mj.scene.extras`).
+        "with:attached:CHILD>PARENT[@X,Y,Z]" ask for further states (`ig2mj.scene.extras`).
       remove: objects of the home that are taken out, with what stands on or in them (`Scene.removed`).
       replace: objects of the home, and what takes their place and their name: a folder or a name of the object library.
         It is fixed to the house if the old one was. What stood on the old one is put down on the new one where that

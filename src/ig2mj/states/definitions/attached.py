@@ -1,6 +1,7 @@
 """Attached(a, b): a is held to b by a weld (OmniGibson's attached_to.py; assembled and hung are the same).
 
-An object that comes to touch the other one of its pair is attached as it is. It comes off where it is pulled `APART`
+An object that comes to touch the other one of its pair is attached as it is; of a pair with a place, where its box is
+within `NEAR` of the place. It comes off where it is pulled `APART`
 from its place, which takes about 250 N for each kilogram (`ig2mj.scene.extras.IMPEDANCE`), and can be attached again
 after the two have been apart. It is attached to one object at a time.
 
@@ -32,15 +33,23 @@ if TYPE_CHECKING:
 APART = 0.01
 """m between the two ends of a joint at which it gives way."""
 
+NEAR = 0.02
+"""m between the box of an object and its place from which it is attached there."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Joints:
-    """Pairs that can be attached: objects, and their main bodies."""
+    """Pairs that can be attached: objects, and their main bodies.
+
+    Attributes:
+      place: where each is attached, m, frame of the parent's main body; NaN: anywhere.
+    """
 
     child: Int[np.ndarray, "N"]
     parent: Int[np.ndarray, "N"]
     child_body: Int[np.ndarray, "N"]
     parent_body: Int[np.ndarray, "N"]
+    place: Float[np.ndarray, "N 3"]
 
     @classmethod
     def of_manifest(cls, tables: SceneTables, manifest: Manifest) -> Joints:
@@ -48,7 +57,8 @@ class Joints:
         pairs = pairs_of(manifest.extras)
         child = np.array([tables.object_names.index(p.child) for p in pairs], int)
         parent = np.array([tables.object_names.index(p.parent) for p in pairs], int)
-        return cls(child, parent, tables.object_root[child], tables.object_root[parent])
+        place = np.array([p.place or (np.nan,) * 3 for p in pairs], np.float32).reshape(-1, 3)
+        return cls(child, parent, tables.object_root[child], tables.object_root[parent], place)
 
     def number_of(self, child: int, parent: int) -> int | None:
         """The place of a pair of objects on the N axis; None: it is none."""
@@ -85,6 +95,23 @@ def stretched(joints: Joints, place: Float[Array, "W N 10"], view: PhysicsView) 
     return length(one - other)
 
 
+def places(joints: Joints, view: PhysicsView) -> Float[Array, "W N 3"]:
+    """Where pairs are attached, m, world frame; NaN: anywhere."""
+    pos, quat = (jnp.asarray(x)[:, joints.parent_body] for x in (view.body_pos, view.body_quat))
+    return pos + quat_rotate(quat, joints.place)
+
+
+def at_place(joints: Joints, view: PhysicsView) -> Bool[Array, "W N"]:
+    """Whether each child is where it can be attached."""
+    anywhere = np.isnan(joints.place[:, 0])
+    if anywhere.all():
+        return jnp.ones((view.object_com.shape[0], len(anywhere)), bool)
+    low, high = (jnp.asarray(x)[:, joints.child] for x in (view.aabb_low, view.aabb_high))
+    at = places(joints, view)
+    gap = jnp.maximum(jnp.maximum(low - at, at - high), 0.0)
+    return anywhere | (jnp.sum(gap * gap, axis=-1) <= NEAR**2)
+
+
 def _after(step: EventStep) -> tuple[Bool[Array, "W N"], Bool[Array, "W N"], Bool[Array, "W N"]]:
     """What is attached after this step, which of it is new, and which pairs have to come apart first."""
     joints, states = of(step.model), step.states
@@ -94,7 +121,7 @@ def _after(step: EventStep) -> tuple[Bool[Array, "W N"], Bool[Array, "W N"], Boo
     kept = attached & ~off
     same = joints.child[:, None] == joints.child
     taken = jnp.any(kept[:, None] & same, axis=-1)
-    able = touching & ~taken & ~waits & ~off
+    able = touching & ~taken & ~waits & ~off & at_place(joints, step.view)
     new = able & ~jnp.any(able[:, None] & np.tril(same, -1), axis=-1)
     return kept | new, new, (waits | off) & touching
 
