@@ -11,7 +11,7 @@ from jaxtyping import Float
 from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.footprint import LOWEST
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor, Point
-from ig2mj.planning.moves import Program
+from ig2mj.planning.moves import PrimitiveFailed, Program
 from ig2mj.planning.placing import bring_out
 from ig2mj.planning.stances import behind_wall
 from ig2mj.planning.steps import Step
@@ -29,7 +29,12 @@ def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, 
     if all(world.held) or not isinstance(world.body, HandedBody):
         return False
     name = clutter_in_the_way(world, step)
-    return name is not None and (yield from bring_out(world, name)).done
+    if name is None:
+        return False
+    try:
+        return (yield from bring_out(world, name)).done
+    except PrimitiveFailed:
+        return False
 
 
 def clutter_in_the_way(world: PlannedWorld, step: Step) -> str | None:

@@ -51,7 +51,7 @@ CLOSING = 0.006
 """m in an agent step by which a closing hand goes on: targets behind a surface add up, and small things that are
 pressed on their support are shot out."""
 
-POSES, WAYS = 6, 40
+POSES, WAYS = 6, 120
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
 
 
