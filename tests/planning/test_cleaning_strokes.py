@@ -1,0 +1,35 @@
+"""Where a cleaning tool goes to take a particle off, and what its box covers there."""
+
+import numpy as np
+import pytest
+
+from ig2mj.planning.cleaning import PRESSED, _about, _one_after_another, _Region, _Stroke
+from ig2mj.planning.world import DirtSpot
+
+UP = np.array([0.0, 0.0, 1.0])
+
+SPONGE = np.array(np.meshgrid([-0.05, 0.05], [-0.05, 0.05], [-0.01, 0.01])).reshape(3, -1).T - [0.0, 0.0, 0.04]
+"""Corners of a flat tool below a hand, m."""
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.8])
+def test_a_tool_is_pressed_so_far_into_a_face_however_it_is_tilted(angle):
+    region, spot = _Region.turned(_about(np.array([1.0, 0.0, 0.0]), angle), SPONGE), DirtSpot(0, np.zeros(3), UP)
+    grip = region.at(spot)
+    assert (grip + region.corners)[:, 2].min() == pytest.approx(-PRESSED)
+    assert region.covers(grip, [spot]) == [spot]
+    assert region.above(spot)[2] > grip[2]
+
+
+def test_a_tilted_tool_reaches_particles_above_the_face_that_it_is_pressed_on():
+    face, above = DirtSpot(0, np.zeros(3), UP), DirtSpot(1, np.array([0.0, 0.03, 0.04]), -UP)
+    flat, tilted = (_Region.turned(_about(np.array([1.0, 0.0, 0.0]), a), SPONGE) for a in (0.0, 0.8))
+    assert flat.covers(flat.at(face), [face, above]) == [face]
+    assert tilted.covers(tilted.at(face), [face, above]) == [face, above]
+
+
+def test_upper_sides_come_first_and_then_the_nearest():
+    spots = [DirtSpot(n, np.array([x, 0.0, 0.8]), UP) for n, x in enumerate((0.0, 1.0, 0.1))]
+    side = DirtSpot(3, np.array([0.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.0]))
+    strokes = [_Stroke(s, 0, [s]) for s in (side, *spots)]
+    assert [s.spot.number for s in _one_after_another(strokes)] == [0, 2, 1, 3]
