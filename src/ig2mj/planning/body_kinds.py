@@ -22,4 +22,5 @@ def body_of(scene: Scene, controller: Controller, agent: int = 0) -> Body:
     if {"forward", "turn_left"} <= set(names):
         model = model_of_arm(scene, controller, agent)
         return WheeledBody(scene, controller, agent) if model is None else ArmBody(scene, controller, agent, model)
-    raise PlanningError(f"robot '{scene.tables.agent_names[agent]}' has no base that planned ways can move")
+    name = scene.tables.agent_names[agent]
+    raise PlanningError(f"robot '{name}' has no base that moves: primitives take one that drives or hovers")
