@@ -47,9 +47,9 @@ CLEARLY = 0.05
 MOVED = 0.03
 """m that an object has moved beyond which its grasp is planned again."""
 
-CLOSING = 0.006
-"""m in an agent step by which a closing hand goes on: targets behind a surface add up, and small things that are
-pressed on their support are shot out."""
+CLOSING, GRIPPING = 0.006, 0.02
+"""m in an agent step by which a closing hand goes on, and a gripper on an arm: a floating hand's targets behind a
+surface add up, and small things that are pressed on their support are shot out."""
 
 POSES, WAYS = 6, 120
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
@@ -124,7 +124,7 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
         Phase(hand=hand, pos=deep, quat=quat, until=Until.TOUCHED, object=index, close=False, limit=25, after="",
               speed=0.03),
         Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15, after="no_grasp",
-              speed=CLOSING),
+              speed=CLOSING if world.body.opening is None else GRIPPING),
         *([Phase(hand=hand, pos=vector3(pose.at(0.0) + lift), keeps=index, close=True, tolerance=0.02, limit=10,
                  after="", speed=0.03)] if lift.any() else []),
         Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=True, tolerance=0.04, limit=30, after="",
