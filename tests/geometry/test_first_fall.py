@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import jax
 import numpy as np
+import pytest
 from hand_world import HandWorld, Item
 
 from ig2mj.geometry.first_fall import FallPieces, Ways, first_met
@@ -23,7 +24,9 @@ def _world(count: int) -> HandWorld:
     return HandWorld(*items)
 
 
-def test_the_first_object_is_the_one_of_least_depth():
+@pytest.mark.parametrize("backend", ["cpu", "gpu"])
+def test_the_first_object_is_the_one_of_least_depth(backend, monkeypatch):
+    monkeypatch.setattr(jax, "default_backend", lambda: backend)  # the object is found in another way on each
     world = _world(12)
     view, tables = world.view(), world.tables
     start = RNG.uniform(-1.2, 1.2, (1, LINES, 2, 3)).astype(np.float32) + np.array([0, 0, 1.5], np.float32)
