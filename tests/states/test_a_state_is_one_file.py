@@ -65,13 +65,13 @@ print(json.dumps(told))
 
 @pytest.fixture(scope="module")
 def told(repository: pathlib.Path, tiny_home_folder: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) -> dict:
-    """What a copy of the package tells of the state that docs/guide/states.md adds: one file, one line in the order."""
+    """A copy of the package with the state that docs/design/adding.md adds: one file, one line of the order."""
     folder = tmp_path_factory.mktemp("made_up")
     package = folder / "ig2mj"
     shutil.copytree(pathlib.Path(ig2mj.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
-    page = (repository / "docs" / "guide" / "states.md").read_text()
+    page = (repository / "docs" / "design" / "adding.md").read_text()
     (package / "states/definitions/age.py").write_text(
-        page.split("## Add a state")[1].split("```python\n")[1].split("```")[0]
+        page.split("## A state")[1].split("```python\n")[1].split("```")[0]
     )
     update = package / "states/update.py"
     text = update.read_text()
