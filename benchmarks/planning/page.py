@@ -229,7 +229,7 @@ def page(kept: dict[str, list[Row]], requests: Sequence[Row] = (), comparisons: 
     return "\n".join(lines)
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     """`head`: titles; ">" before one sets its column flush right."""
     titles = [h.removeprefix(">") for h in head]
     marks = ["--:" if h.startswith(">") else "---" for h in head]
@@ -271,7 +271,7 @@ def _rungs(kept: dict[str, list[Row]]) -> list[str]:
                 str(sum(line["crashed"] for line in lines)),
             )
         )
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _activities(kept: dict[str, list[Row]]) -> list[str]:
@@ -297,7 +297,7 @@ def _activities(kept: dict[str, list[Row]]) -> list[str]:
         times = [t for t in physics["time"] if t] if physics else []
         cells += [f"{statistics.median(times):.0f}" if times else "-", _failures(there[-1])]
         rows.append(cells)
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _failures(line: Row) -> str:
@@ -324,7 +324,7 @@ def _primitives(kept: dict[str, list[Row]]) -> list[str]:
                 counts = [sum(one["reasons"].get(reason, 0) for one in own) for reason in reasons]
                 share = [_percent(sum(one[key] for one in own) / tried) for key in ("first", "done")]
                 rows.append([rung, primitive, str(tried), *share, *(str(n) if n else "" for n in counts)])
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _requests(lines: Sequence[Row]) -> list[str]:
@@ -346,7 +346,7 @@ def _requests(lines: Sequence[Row]) -> list[str]:
         "and *with retries*: of those. *median* and *95 %*: processor seconds of planning. *failures*: of those with",
         "a solution.",
         "",
-        *_table(("rung", *(c.replace("?", "") for c in COLUMNS)), rows),
+        *table(("rung", *(c.replace("?", "") for c in COLUMNS)), rows),
         "",
     ]
 
@@ -367,7 +367,7 @@ def _comparisons(lines: Sequence[Row]) -> list[str]:
         "",
         "In physics, from the same start states ([comparisons](../guide/planning.md#comparisons)).",
         "",
-        *_table(head, rows),
+        *table(head, rows),
         "",
     ]
 
@@ -386,7 +386,7 @@ def _provenance(kept: dict[str, list[Row]], requests: Sequence[Row]) -> list[str
             rows.append((rung, key, ", ".join(f"`{value}`" for value in found)))
         versions = sorted({f"{name} {value}" for line in lines for name, value in line["versions"].items()})
         rows.append((rung, "versions", ", ".join(versions)))
-    return _table(("rung", "of the rows", ""), rows)
+    return table(("rung", "of the rows", ""), rows)
 
 
 if __name__ == "__main__":
