@@ -16,7 +16,7 @@ import warp as wp
 import ig2mj.process
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp, quiet_warp, settings
-from ig2mj.process.gc_pause import Compiled, GcPause
+from ig2mj.process.gc_pause import SELDOM, Compiled, GcPause, collect_seldom
 
 STATE = """
 import jax, warp as wp, gc, os
@@ -171,3 +171,16 @@ def test_a_compiled_function_is_traced_while_the_collector_rests():
     compiled = Compiled(doubled, static_argnums=0)
     assert (compiled(3), compiled(3), seen, gc.isenabled()) == (6, 6, [False], True)
     assert compiled._cache_size() == 1 and compiled.lower(4).compile()() == 8
+
+
+def test_commands_collect_garbage_seldom_unless_thresholds_were_chosen():
+    chosen = gc.get_threshold()
+    try:
+        gc.set_threshold(900, 9, 9)
+        collect_seldom()
+        assert gc.get_threshold() == (900, 9, 9)
+        gc.set_threshold(700, 10, 10)
+        collect_seldom()
+        assert gc.get_threshold() == SELDOM
+    finally:
+        gc.set_threshold(*chosen)

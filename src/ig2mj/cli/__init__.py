@@ -52,6 +52,7 @@ from ig2mj.errors import Ig2mjError
 from ig2mj.install_hint import pip_install_module
 from ig2mj.plugins import Registry
 from ig2mj.plugins.named_files import name_file
+from ig2mj.process.gc_pause import collect_seldom
 from ig2mj.process.out_of_memory import is_out_of_memory, out_of_memory_text
 from ig2mj.process.settings import default_variables
 from ig2mj.process.spawning import allow_spawning
@@ -111,6 +112,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         if getattr(sys, stream) is None:  # the shell closed it: `>&-`
             setattr(sys, stream, pathlib.Path(os.devnull).open("w"))  # noqa: SIM115  as long as the process
     allow_spawning()
+    collect_seldom()
     # XLA's C++ warnings, such as of its emitter of LLVM code, say nothing to a user. Read when JAX is imported.
     default_variables({"TF_CPP_MIN_LOG_LEVEL": "2"})
     status = call(sys.argv[1:] if argv is None else argv)

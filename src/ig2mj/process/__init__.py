@@ -33,9 +33,12 @@ or earlier by any caller; a second call does nothing. What the user has decided 
   - Steps of MJX get a contact filter, MuJoCo Warp's callback, which drops what our engines' hands ignore and nothing
     in other models (`ig2mj.engine.warp.ignored_contacts`).
 
-Where engines are imported and made, their kernels loaded, worlds started and programs traced, and while Warp captures a
-graph:
+Where environments and engines are imported and made, kernels loaded, worlds started and programs traced, and while
+Warp captures a graph:
   - Python's cyclic garbage collector is off, and on again afterwards if it was (`ig2mj.process.gc_pause`).
+
+Commands (`ig2mj ...`):
+  - The collector's thresholds are `ig2mj.process.gc_pause.SELDOM` where they were Python's own.
 
 While an entry point of ig2mj runs (`ig2mj.process.entry`):
   - JAX's option `jax_enable_x64` is off in this thread, and afterwards what it was.
