@@ -42,8 +42,7 @@ from ig2mj.envs.start_choices import (
     with_open_doors,
 )
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.process import entry_point
-from ig2mj.process.gc_pause import GC_PAUSED
+from ig2mj.process import GC_PAUSED, entry_point
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.added_objects import object_texts, with_objects

@@ -60,6 +60,7 @@ from __future__ import annotations
 
 from ig2mj.process.compilation import CACHE_VARIABLE, cache_folder
 from ig2mj.process.entry import entry_point
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.process.settings import (
     keep_scratch_in_place,
     prepare_jax,
@@ -74,6 +75,7 @@ from ig2mj.process.settings import (
 
 __all__ = [
     "CACHE_VARIABLE",
+    "GC_PAUSED",
     "cache_folder",
     "entry_point",
     "keep_scratch_in_place",
