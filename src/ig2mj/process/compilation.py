@@ -89,6 +89,7 @@ PROGRAMS = {
     "rollout_fn": "a rollout of all worlds",
     "expert_fn": "an expert",
     "choose": "a policy",
+    "init": "a new learner",
     "whole": "an iteration of training",
     "collect": "a rollout of training",
     "learn": "the updates of a training iteration",
