@@ -95,6 +95,12 @@ def test_a_number_of_steps_is_given_by_name(tiny_home):
         ig2mj.Simulation(tiny_home, states=None).step(30)
 
 
+@pytest.mark.parametrize("count", [-1, 1.5, "a", True])
+def test_a_number_of_steps_is_a_whole_number(tiny_home, count):
+    with pytest.raises(EngineError, match="a whole number of at least 0 is needed"):
+        ig2mj.Simulation(tiny_home, states=None).step(count=count)
+
+
 def test_a_urdf_in_the_place_of_a_robot_or_a_scene_is_named_as_such():
     with pytest.raises(EngineError, match=r"UrdfRobot.load\('x.urdf'\), on the command line --robot-urdf x.urdf"):
         ig2mj.make(TASK, robot="x.urdf")

@@ -6,13 +6,15 @@ import pathlib
 import subprocess
 import sys
 
+import jaxtyping
 import msgspec
 import numpy as np
 import pytest
 import tiny_home as homes
 
 import ig2mj
-from ig2mj.errors import InputError, ManifestError, UnknownNameError
+from ig2mj.agents import Fetch
+from ig2mj.errors import Ig2mjError, InputError, ManifestError, UnknownNameError
 from ig2mj.scene import manifest as mf
 
 
@@ -179,6 +181,32 @@ def test_a_manifest_of_another_version_is_refused(tmp_path):
     (tmp_path / "manifest.json").write_bytes(msgspec.json.encode(raw))
     with pytest.raises(ManifestError, match="format version 99"):
         ig2mj.load_scene(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("agents", "says"),
+    [
+        ("fetch", "agents = 'fetch': a list of robots is expected"),
+        (["fetch"], "agents: 'fetch' is not a robot"),
+        (Fetch().at(0, 0, 0), "a list of robots is expected"),
+        ([Fetch], "Fetch'> is not a robot"),
+        ([Fetch().at(float("nan"), 0, 0)], "robot 'fetch' starts at .*finite numbers are expected"),
+        ([Fetch().at(0, 0, 0), Fetch().at(1, 0, 0)], "two robots are named 'fetch'"),
+        ([Fetch(name="table").at(1, 0, 0)], "robot 'table' cannot be added to the scene: .*repeated name 'table'"),
+    ],
+)
+def test_what_is_no_robot_is_refused_in_one_line(tiny_home_folder, agents, says, monkeypatch):
+    monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)  # as users call
+    with pytest.raises(Ig2mjError, match=says) as told:
+        ig2mj.load_scene(tiny_home_folder, agents=agents)
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("path", [None, 3])
+def test_what_is_no_path_is_refused(path, monkeypatch):
+    monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)
+    with pytest.raises(InputError, match=f"{path}: is not a path"):
+        ig2mj.load_scene(path)
 
 
 def test_agents_are_compiled_in_and_listed(tiny_home_folder, tiny_home):

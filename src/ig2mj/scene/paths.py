@@ -27,6 +27,12 @@ _URDF = (
 _FIX = "give the folder that `ig2mj convert` wrote"
 
 
+def _as_path(path: str | os.PathLike) -> pathlib.Path:
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(repr(path), "is not a path", fix=f"{_FIX}, or the name of a home")
+    return pathlib.Path(path)
+
+
 def shipped_homes() -> list[str]:
     """Names of the homes in `SHIPPED_HOMES`, sorted."""
     return sorted(file.parent.name for file in SHIPPED_HOMES.glob(f"*/{MANIFEST_FILE}"))
@@ -41,7 +47,7 @@ def scene_folder(path: str | os.PathLike) -> pathlib.Path:
     Raises:
       InputError: there is no such path (the message names near matches among the shipped homes), or it is another file.
     """
-    path = pathlib.Path(path)
+    path = _as_path(path)
     if path.is_dir():
         return path
     if path.suffix.lower() == ".urdf":
@@ -66,7 +72,7 @@ def scene_folder(path: str | os.PathLike) -> pathlib.Path:
 
 def model_file(path: str | os.PathLike) -> pathlib.Path:
     """The MJCF file of a scene: `path` itself, or the one in `scene_folder(path)`. Raises InputError."""
-    path = pathlib.Path(path)
+    path = _as_path(path)
     if path.is_file() and path.name in MODEL_FILES:
         return path
     folder = scene_folder(path)

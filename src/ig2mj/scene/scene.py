@@ -16,6 +16,7 @@ from typing import Protocol, runtime_checkable
 
 import msgspec
 import mujoco
+import numpy as np
 
 from ig2mj.cluster.jobs import import_function
 from ig2mj.errors import Ig2mjError, InputError, ManifestError, UnknownNameError, without_lines
@@ -265,11 +266,13 @@ def load_scene(
     Raises:
       InputError: a file is missing or is not valid MJCF. UnknownNameError: there is no such folder and the library has
         no such object, the home has none of this name, or there are no such looks or no such substance.
-        Ig2mjError: an object starts inside of something, or a replacement stands in something, or falls.
+        Ig2mjError: an object starts inside of something, or a replacement stands in something, or falls; or `agents`
+        are no robots, two of them have one name, or one starts at no finite place.
         ManifestError: a manifest is broken, or does not belong to its MJCF. StateError: no place was found at which the
         predicate holds.
     """
     check_looks(looks)
+    _check_agents(agents)
     file = model_file(path)
     home = load_manifest(file.parent / MANIFEST_FILE)
     if home.format_version < FORMAT_VERSION:
@@ -366,9 +369,31 @@ def _load(
     return dataclasses.replace(scene, replacements=replacements)
 
 
+def _check_agents(agents: Sequence[Agent]) -> None:
+    """Raises Ig2mjError: `agents` of `load_scene` are no robots, of one name, or at no place."""
+    how = "[ig2mj.agents.Fetch().at(x, y, yaw)]"
+    if isinstance(agents, str) or not isinstance(agents, Sequence):
+        raise Ig2mjError(f"agents = {agents!r}: a list of robots is expected, such as {how}")
+    names = list[str]()
+    for agent in agents:
+        if isinstance(agent, type) or not (isinstance(agent, Attachable) or callable(agent)):
+            raise Ig2mjError(f"agents: {agent!r} is not a robot, such as those of {how}")
+        place = [*getattr(agent, "pos", ()), *getattr(agent, "quat", ())]
+        if not np.isfinite(np.asarray(place, float)).all():
+            raise Ig2mjError(f"robot '{getattr(agent, 'name', agent)}' starts at {place}: finite numbers are expected")
+        names += [agent.name] if isinstance(getattr(agent, "name", None), str) else []
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise Ig2mjError(f"two robots are named '{twice[0]}': give one another, such as Fetch(name=\"other\")")
+
+
 def _attach_all(agents: Sequence[Agent], spec: mujoco.MjSpec, manifest: Manifest) -> list[AgentEntry]:
     """Adds the agents, and what must be compiled for them and the scene together."""
-    entries = [agent.attach(spec) if isinstance(agent, Attachable) else agent(spec) for agent in agents]
+    entries = list[AgentEntry]()
+    for agent in agents:
+        try:
+            entries.append(agent.attach(spec) if isinstance(agent, Attachable) else agent(spec))
+        except ValueError as e:
+            raise Ig2mjError(f"robot '{getattr(agent, 'name', agent)}' cannot be added to the scene: {e}") from e
     for entry in entries:
         for body, categories in entry.no_contact.items():
             for passed in (o for o in manifest.objects if o.category in categories):

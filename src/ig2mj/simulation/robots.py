@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.engine.base import whole_number
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import ActionError, EngineError, UnknownNameError
 from ig2mj.process import entry_point
@@ -98,7 +99,7 @@ class RobotsOfWorld:
             raise ActionError("an action is of finite numbers")
         row = np.clip(row, self.action_low, self.action_high).astype(np.float32)
         simulation = self._simulation
-        for _ in range(count):
+        for _ in range(whole_number("count", count, 0)):
             simulation.batch, ctrl = self._core.act(simulation.batch, row[None])
             simulation.step(np.asarray(ctrl, np.float64)[0], self._steps)
         return simulation.view

@@ -26,7 +26,7 @@ import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import Grasping
-from ig2mj.engine.base import Engine, Physics, Write
+from ig2mj.engine.base import Engine, Physics, Write, whole_number
 from ig2mj.engine.registry import check_options, make_engine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
@@ -272,10 +272,10 @@ class Simulation(Recorded):
           ctrl: [nu] controls of the agents' actuators; None keeps the last ones.
 
         Raises:
-          EngineError: ctrl has another length than the model has actuators.
+          EngineError: ctrl has another length than the model has actuators, or `count` is no whole number.
           LostWorldError: the world is no longer finite; nothing changes it but `reset` and what loads another.
         """
-        row = None if ctrl is None else np.asarray(ctrl, np.float64)
+        count, row = whole_number("count", count, 0), None if ctrl is None else np.asarray(ctrl, np.float64)
         if row is not None and not row.ndim:
             raise EngineError(f"step({ctrl}): the first argument is ctrl; a number of steps is step(count={ctrl})")
         if row is not None and row.shape != (self.scene.model.nu,):
