@@ -381,7 +381,8 @@ def _check_agents(agents: Sequence[Agent]) -> None:
         place = [*getattr(agent, "pos", ()), *getattr(agent, "quat", ())]
         if not np.isfinite(np.asarray(place, float)).all():
             raise Ig2mjError(f"robot '{getattr(agent, 'name', agent)}' starts at {place}: finite numbers are expected")
-        names += [agent.name] if isinstance(getattr(agent, "name", None), str) else []
+        name = getattr(agent, "name", None)
+        names += [name] if isinstance(name, str) else []
     if twice := [name for name in names if names.count(name) > 1]:
         raise Ig2mjError(f"two robots are named '{twice[0]}': give one another, such as Fetch(name=\"other\")")
 
