@@ -122,14 +122,15 @@ def spilled(
     found, p = of(model), model.parameters
     soakable = np.isfinite(p.wetness_soaked)
     soaking = jnp.where(by_taps[..., None], 0.0, amounts) / DROP
-    mine = (met[..., None] == np.arange(len(soakable))) & soakable  # [W, K, O]
     wet = jnp.asarray(states.wetness)
     if found.water >= 0:
+        mine = (met[..., None] == np.arange(len(soakable))) & soakable  # [W, K, O]
         water = jnp.sum(jnp.where(mine, soaking[..., found.water, None], 0.0), axis=1)  # [W, O]
         soaked = wet + water if model.paper else jnp.maximum(wet, np.where(soakable, p.wetness_soaked, 0.0))
         wet = jnp.where(water > 0, soaked, wet)
     own = np.arange(len(found.names)) != found.water
-    drops = jnp.sum(jnp.where(mine[:, :, found.covered, None] & own, soaking[:, :, None], 0.0), axis=1)  # [W, D, U]
+    absorbs = (met[..., None] == found.covered) & soakable[found.covered]  # [W, K, D]
+    drops = jnp.sum(jnp.where(absorbs[..., None] & own, soaking[:, :, None], 0.0), axis=1)  # [W, D, U]
     takes = np.append(~p.has("waterSink") & ~soakable, False)  # the last: no object
     row = jnp.where(jnp.asarray(takes)[met], jnp.asarray(found.row)[met], len(found.covered))  # [W, K]
     coat = jnp.asarray(states.coat)
