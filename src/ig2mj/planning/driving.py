@@ -106,6 +106,8 @@ def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
 def _keeping(world: PlannedWorld, program: Program) -> Program:
     """The same, which ends where a hand loses what it holds: two hands are looked at in turns."""
     held = [world.index(n) for n in dict.fromkeys(world.held) if n and not world.domain.fixed(n)]
+    if not held:  # it was lost while the hands got ready
+        return program
     return [dataclasses.replace(p, keeps=held[k % len(held)]) for k, p in enumerate(program)]
 
 
