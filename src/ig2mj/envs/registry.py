@@ -42,7 +42,7 @@ from ig2mj.envs.start_choices import (
     with_open_doors,
 )
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.process import GC_PAUSED, entry_point
+from ig2mj.process import entry_point
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.added_objects import object_texts, with_objects
@@ -151,7 +151,6 @@ def make(name: str, *, action_space: Literal["primitives"], **options: Any) -> A
 
 
 @entry_point
-@GC_PAUSED
 def make(
     name: str | Definition,
     config: EnvConfig | Mapping[str, Any] | str | TaskRobot | None = None,

@@ -33,7 +33,7 @@ or earlier by any caller; a second call does nothing. What the user has decided 
   - Steps of MJX get a contact filter, MuJoCo Warp's callback, which drops what our engines' hands ignore and nothing
     in other models (`ig2mj.engine.warp.ignored_contacts`).
 
-Where environments and engines are imported and made, kernels loaded, worlds started and programs traced, and while
+Where engines and their cameras are imported and made, kernels loaded, worlds started and programs traced, and while
 Warp captures a graph:
   - Python's cyclic garbage collector is off, and on again afterwards if it was (`ig2mj.process.gc_pause`).
 
@@ -60,7 +60,6 @@ from __future__ import annotations
 
 from ig2mj.process.compilation import CACHE_VARIABLE, cache_folder
 from ig2mj.process.entry import entry_point
-from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.process.settings import (
     keep_scratch_in_place,
     prepare_jax,
@@ -75,7 +74,6 @@ from ig2mj.process.settings import (
 
 __all__ = [
     "CACHE_VARIABLE",
-    "GC_PAUSED",
     "cache_folder",
     "entry_point",
     "keep_scratch_in_place",

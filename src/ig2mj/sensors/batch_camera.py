@@ -34,6 +34,7 @@ from ig2mj.looks.costume import Followers
 from ig2mj.looks.home_plan import covered_triangles
 from ig2mj.looks.state_looks import OF_MATERIAL, lamp_geoms, tinted_materials
 from ig2mj.looks.visual import visual_owners
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, camera_id, check_request
@@ -62,6 +63,7 @@ class BatchCamera:
     """A pure function from worlds to images, for the Warp engine. Cameras ride on their bodies ("fixed" mode), at the
     poses of each world's `ModelFields`, but for those whose poses are given with each call."""
 
+    @GC_PAUSED
     def __init__(
         self,
         engine: Engine,
