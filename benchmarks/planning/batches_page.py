@@ -109,20 +109,25 @@ def page(batched: Sequence[Row], policies: Sequence[Row]) -> str:
         for row in policies
     ]  # fmt: skip
     commits = sorted({str(row["commit"]) for row in (*batched, *policies)})
-    return "\n".join(
-        [
-            "# The planner in many worlds, and policies that learn from it",
-            "",
-            "Written by `python -m benchmarks.planning.batches_page`; not by hand. Humanoid, assisted grasping,",
-            "doors between rooms open at the start.",
-            "",
+    lines = [
+        "# The planner in many worlds, and policies that learn from it",
+        "",
+        "Written by `python -m benchmarks.planning.batches_page`; not by hand. Humanoid, assisted grasping,",
+        "doors between rooms open at the start.",
+        "",
+    ]
+    if batched:
+        lines += [
             "## Many worlds",
             "",
-            "*planning's share*: of wall time, all that is not the environment's step. *held still*: agent steps in",
-            "which a world has no program yet. *processor s*: of planning, of those that the processes had.",
+            "*planning's share*: of wall time, all that is not the environment's step. *held still*: agent steps",
+            "in which a world has no program yet. *processor s*: of planning, of those that the processes had.",
             "",
             *table(head, many),
             "",
+        ]
+    if policies:
+        lines += [
             "## Policies",
             "",
             "From the planner's demonstrations, by the state; held-out start states. *held-out loss*: of",
@@ -130,10 +135,9 @@ def page(batched: Sequence[Row], policies: Sequence[Row]) -> str:
             "",
             *table(("activity", "algorithm", ">episodes", ">success", "held-out loss"), learned),
             "",
-            f"Commits: {', '.join(f'`{commit}`' for commit in commits)}." if commits else "",
-            "",
         ]
-    )
+    lines += [f"Commits: {', '.join(f'`{commit}`' for commit in commits)}." if commits else "No rows are taken in.", ""]
+    return "\n".join(lines)
 
 
 def _interval(row: Row) -> str:
