@@ -130,7 +130,7 @@ def condensed(name: str, rows: Sequence[Row]) -> Row:
 def condition_of(row: Row) -> str:
     """By what a row differs from the main ones, which are the humanoid's, such as "--doors shut"; "" for a main one."""
     conditions = row["conditions"]
-    found = {"robot": robot} if (robot := conditions.get("robot", "humanoid")) != "humanoid" else {}
+    found = {"robot": robot} if (robot := conditions.get("robot") or "humanoid") != "humanoid" else {}
     found |= {"doors": conditions["doors"]} if conditions.get("doors") == "shut" else {}
     found |= {name: conditions[name] for name in DEFAULTS if name in conditions}
     return " ".join(f"--{name} {value}" for name, value in found.items())

@@ -79,7 +79,7 @@ def test_rows_of_two_protocols_are_not_mixed(arguments):
 
 
 def test_other_agents_are_compared_on_the_same_starts_and_leave_the_main_rows_alone(arguments, tmp_path):
-    arguments.doors = "open"
+    arguments.doors, arguments.robot = "open", "humanoid"
     main = list(run(arguments).values())
     arguments.agent = "random"
     other = [row for row in run(arguments).values() if "agent" in row["conditions"]]
