@@ -28,9 +28,13 @@ import tyro
 
 from benchmarks.harness.made_home import write_home
 from benchmarks.harness.paths import ROOT, WORK, environment, module
+from ig2mj.process.processors import available
 
 SIZES = (20, 60, 120)
 PROFILES = WORK / "profiles"
+
+MOST_JOBS = 4
+"""Processes that share a card of 80 GB while they are compiled and timed: nine run out of its memory."""
 
 FEWEST_SECONDS = 45.0
 """A case is not begun with less time than this left."""
@@ -59,7 +63,7 @@ class Args:
     minutes: float = 0.0
     """Time limit; 0: 3 for calibrate, 8 for the others."""
     jobs: int = 0
-    """Processes at the same time; 0: one per two processors, and no more than 8."""
+    """Processes at the same time; 0: one per two processors, and no more than `MOST_JOBS`."""
     only: tuple[str, ...] = ()
     """Only cases whose name contains one of these."""
     worlds: int = 0
@@ -222,7 +226,7 @@ def main(args: Args) -> list[str]:
     homes = {f"made_{n}": str(write_home(WORK / f"made_{n}", n)) for n in SIZES}
     homes |= {file.parent.name: file.parent.name for file in (ROOT / "scenes_mjcf").glob("*/manifest.json")}
     seconds = 60 * (args.minutes or {"calibrate": 3.0}.get(args.plan, 8.0))
-    jobs = args.jobs or max(1, min(8, (os.cpu_count() or 2) // 2))
+    jobs = args.jobs or max(1, min(MOST_JOBS, available() // 2))
     if args.plan == "calibrate":
         queue = calibrations(homes, args.out, args.worlds)
     elif args.plan == "readme":

@@ -18,7 +18,7 @@ def test_a_users_script_starts_no_process_by_itself(monkeypatch: pytest.MonkeyPa
 
 def test_a_command_shares_work_between_processors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spawning, "_allowed", False)
-    monkeypatch.setattr(spawning.os, "cpu_count", lambda: 16)
+    monkeypatch.setattr(spawning, "available", lambda: 16)
     spawning.allow_spawning()
     assert [spawning.processes_for(parts) for parts in (0, 1, 5, 1000)] == [1, 1, 5, 16]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import os
 import pathlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,6 +12,7 @@ import tyro
 
 from ig2mj.cli.common.conversion import DEFAULTS, Common, Flag, check_kind, options_of
 from ig2mj.cli.convert_dataset import convert_dataset
+from ig2mj.process.processors import available
 
 if TYPE_CHECKING:
     from ig2mj_converters.base.outcome import ConversionOutcome
@@ -111,7 +111,7 @@ def convert_object(
     if split is not None:
         check_joins(split, category, model or urdf.stem, fixed)
 
-    options = options_of(common, default_jobs=os.cpu_count() or 1, mesh_root=mesh_root, package_path=package_path)
+    options = options_of(common, default_jobs=available(), mesh_root=mesh_root, package_path=package_path)
     with _progress(f"converting {urdf.name}") as options_with:
         outcome = convert(
             urdf,
@@ -176,7 +176,7 @@ def convert_robot(
     check_kind(out, "robot")
     kept = own_layout(out)
     former = None if kept is None or layout is not None else (kept.name, kept.read_bytes())
-    options = options_of(common, default_jobs=os.cpu_count() or 1, mesh_root=mesh_root, package_path=package_path)
+    options = options_of(common, default_jobs=available(), mesh_root=mesh_root, package_path=package_path)
     mountings = [Mounting.of_words(words) for words in gripper]
     with replaced_folder(out) as folder:
         made = folder / ".converted"

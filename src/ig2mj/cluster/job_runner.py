@@ -9,7 +9,6 @@ from __future__ import annotations
 import collections
 import contextlib
 import dataclasses
-import os
 import time
 from collections.abc import Collection, Generator, Iterable, Sequence
 from typing import Protocol, runtime_checkable
@@ -18,6 +17,7 @@ from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.cluster.jobs import Job, JobResult, JobSet
 from ig2mj.cluster.journal import Journal, MemoryStore
 from ig2mj.errors import ClusterError, EngineError, Ig2mjError, StateError
+from ig2mj.process.processors import available
 
 RETRIES = 2
 """Retries of a failed job. Errors of the user (`Ig2mjError`) are not retried."""
@@ -167,6 +167,6 @@ def _workers(job_set: JobSet, where: Where, count: int | None) -> Workers:
         return RayNodes(job_set, where.cluster)
     from ig2mj.cluster.processes import LocalProcesses, ThisProcess
 
-    processes = where.jobs or os.cpu_count() or 1
+    processes = where.jobs or available()
     processes = processes if count is None else min(processes, count)
     return ThisProcess(job_set) if processes == 1 else LocalProcesses(job_set, processes)

@@ -15,6 +15,8 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+from ig2mj.process.processors import available
+
 _allowed = False
 
 
@@ -27,7 +29,7 @@ def allow_spawning() -> None:
 def processes_for(parts: int) -> int:
     """Number of processes that share so many equal parts of a work: in a command of ig2mj at most one per processor,
     elsewhere 1."""
-    return max(1, min(parts, os.cpu_count() or 1)) if _allowed else 1
+    return max(1, min(parts, available())) if _allowed else 1
 
 
 def worker_processes(

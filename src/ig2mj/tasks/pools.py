@@ -11,7 +11,6 @@ import concurrent.futures
 import contextlib
 import hashlib
 import json
-import os
 import pathlib
 import re
 import sys
@@ -27,6 +26,7 @@ from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.registry import make_engine
 from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.process import entry_point
+from ig2mj.process.processors import available
 from ig2mj.process.progress import progress as shown
 from ig2mj.process.spawning import processes_for, worker_processes
 from ig2mj.sampling.many import sample
@@ -192,7 +192,7 @@ def _pool(
 
     def sample_rows(tried: int, rows: int) -> Iterator[tuple[int, Pool | None]]:
         # A process that starts takes as long as some fifty rows.
-        processes = processes_for(rows // (2 * CHUNK)) if jobs is None else jobs or os.cpu_count() or 1
+        processes = processes_for(rows // (2 * CHUNK)) if jobs is None else jobs or available()
         hint = _hint(task, split, count) if processes == 1 else ""
         print(f"sampling {rows} start states of {task.name}, once{hint}", file=sys.stderr)
         made, first, limit = 0, tried, CHUNK * limit_of(requested)
@@ -220,7 +220,7 @@ def _pool(
 
 def sampling_processes(jobs: int) -> concurrent.futures.Executor:
     """Processes that sample parts of pools; 0: one per processor. Close it, or use it in a `with`."""
-    return worker_processes(jobs or os.cpu_count() or 1, ctrl_c=True)
+    return worker_processes(jobs or available(), ctrl_c=True)
 
 
 def limit_of(requested: int) -> int:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import os
 import pathlib
 import shutil
 from typing import TYPE_CHECKING, Annotated
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from ig2mj.errors import Ig2mjError, InputError
+from ig2mj.process.processors import available
 
 if TYPE_CHECKING:
     from ig2mj.agents.urdf import UrdfRobot
@@ -101,7 +101,7 @@ def _converted(file: pathlib.Path, layout: pathlib.Path | None, option: str) -> 
     out = _place(file, layout) / file.stem
     with progress_bar() as bar:
         report = add_bar(bar, f"converting {file.name}")
-        convert_robot(file, out, options=ConvertOptions(report=False, jobs=os.cpu_count() or 1, progress=report))
+        convert_robot(file, out, options=ConvertOptions(report=False, jobs=available(), progress=report))
     _put_layout(out, layout)
     return out
 

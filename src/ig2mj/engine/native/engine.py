@@ -14,7 +14,6 @@ from __future__ import annotations
 import copy
 import dataclasses
 import functools
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -47,6 +46,7 @@ from ig2mj.engine.speed_limits import SpeedLimits
 from ig2mj.engine.view import SCHEMA, Array, PhysicsView, axis_sizes
 from ig2mj.errors import EngineError, LostWorldError
 from ig2mj.process import prepare_mujoco
+from ig2mj.process.processors import available
 from ig2mj.scene.scene import Scene
 
 
@@ -87,7 +87,7 @@ class NativeEngine(HostExecution, SceneEngine):
         if threads is not None:
             whole_number("threads", threads)
         self.incremental = incremental
-        self.threads = min(threads or os.cpu_count() or 1, num_worlds)
+        self.threads = min(threads or available(), num_worlds)
         self._slots = [ModelSlot(_engine_model(scene.model, self.timestep)) for _ in range(self.threads)]
         model = self._slots[0].model
         self.layout: ModelLayout = make_layout(model, self.tables)
