@@ -28,7 +28,8 @@ class StateCopies:
     def __copy__(self) -> Any:
         """An environment on the same engine."""
         other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__)
+        for name, value in vars(self).items():
+            setattr(other, name, value)
         return other
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Any:

@@ -67,11 +67,8 @@ class ExtendedStates(_Fields):
 
 
 def with_fields(states: ExtendedStates, fields: Mapping[str, Any]) -> ExtendedStates:
-    """A copy with other values of some fields, in a fifth of the time of `dataclasses.replace`."""
-    made = object.__new__(type(states))
-    made.__dict__.update(states.__dict__)
-    made.__dict__.update(fields)
-    return made
+    """A copy with other values of some fields, in less time than `dataclasses.replace` takes."""
+    return type(states)(**{**vars(states), **fields})
 
 
 def _others() -> tuple[StateSpec, ...]:
