@@ -255,7 +255,7 @@ def _rungs(kept: dict[str, list[Row]]) -> list[str]:
         ">mean success", ">mean q", ">demonstrations an hour", ">crashed",
     )  # fmt: skip
     rows = []
-    for rung, lines in kept.items():
+    for rung, lines in _by_commit(kept):
         spent = sum(sum(line["processor"]) for line in lines)
         solved = sum(sum(line["success"]) for line in lines)
         rows.append(
@@ -272,6 +272,16 @@ def _rungs(kept: dict[str, list[Row]]) -> list[str]:
             )
         )
     return table(head, rows)
+
+
+def _by_commit(kept: dict[str, list[Row]]) -> Iterable[tuple[str, list[Row]]]:
+    """Rungs, and each of those with rows of several commits once more for every commit."""
+    for rung, lines in kept.items():
+        yield rung, lines
+        commits = collections.Counter(", ".join(line["commits"]) for line in lines)
+        if len(commits) > 1:
+            for commit, _ in commits.most_common():
+                yield f"{rung}, {commit}", [line for line in lines if ", ".join(line["commits"]) == commit]
 
 
 def _activities(kept: dict[str, list[Row]]) -> list[str]:
