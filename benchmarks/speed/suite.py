@@ -34,7 +34,7 @@ SIZES = (20, 60, 120)
 PROFILES = WORK / "profiles"
 
 MOST_JOBS = 4
-"""Processes that share a card of 80 GB while they are compiled and timed: nine run out of its memory."""
+"""Processes that share a card of 80 GB while they are compiled and timed: eight run out of its memory."""
 
 FEWEST_SECONDS = 45.0
 """A case is not begun with less time than this left."""

@@ -121,13 +121,14 @@ class Obstacles:
         self._body: tuple[float, ...] | None = None
         self._normal, self._offset, self._low, self._high = placed.normal, placed.offset, placed.low, placed.high
 
-    def distance(self, points: Float[np.ndarray, "M 3"]) -> Float[np.ndarray, "M"]:
+    def distance(self, points: Float[np.ndarray, "*M 3"]) -> Float[np.ndarray, "*M"]:
         """m from points to the nearest piece, at most `FAR`; negative inside."""
-        low, high = points.min(0) - FAR, points.max(0) + FAR
+        every = points.reshape(-1, 3)
+        low, high = every.min(0) - FAR, every.max(0) + FAR
         near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
         if not len(near):
-            return np.full(len(points), FAR)
-        away = np.einsum("kni,mi->mkn", self._normal[near], points) - self._offset[near]
+            return np.full(points.shape[:-1], FAR)
+        away = np.einsum("kni,...i->...kn", self._normal[near], points) - self._offset[near]
         return np.minimum(away.max(-1).min(-1), FAR)
 
     def about(self, axis: Sequence[float] | np.ndarray, radius: float, height: float) -> Obstacles:

@@ -185,7 +185,7 @@ def _fingers_have_room(
     if not len(points) or body.opening is None:
         return np.ones(len(points), bool)
     corners = np.stack([body.hand_corners(f, p) for f, p in zip(fingers, palms, strict=True)]) + points[:, None]
-    distance = obstacles.distance(corners.reshape(-1, 3)).reshape(corners.shape[:2])
+    distance = obstacles.distance(corners)
     return np.all(distance > -GRAZE, axis=1)
 
 
@@ -205,7 +205,7 @@ def _between_fingers(
     """
     along = np.linspace(-opening / 2, opening / 2, SLICES)
     at = (points + BITE * palms)[:, None] + along[:, None] * fingers[:, None]
-    inside = own.distance(at.reshape(-1, 3)).reshape(at.shape[:2]) < 0.0
+    inside = own.distance(at) < 0.0
     low = np.where(inside, along, opening).min(1)
     high = np.where(inside, along, -opening).max(1)
     fits = np.flatnonzero((high >= low) & (high - low <= opening - 2 * SPARE_OPENING))
@@ -229,7 +229,7 @@ def _room(
         return np.zeros(0, bool)
     spheres = np.stack([body.hand_spheres(f, p) for f, p in zip(fingers, palms, strict=True)])
     centres = (points - away * palms)[:, None] + spheres[..., :3]
-    distance = obstacles.distance(centres.reshape(-1, 3)).reshape(centres.shape[:2])
+    distance = obstacles.distance(centres)
     return np.all(distance >= share * spheres[..., 3], axis=1)
 
 

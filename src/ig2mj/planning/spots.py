@@ -139,7 +139,7 @@ def _roofed(positions: Float[np.ndarray, "n 3"], around: Obstacles, wide: float)
     if not len(positions):
         return np.zeros(0, bool)
     points = positions[:, None] + np.stack([np.zeros(len(COLUMN)), np.zeros(len(COLUMN)), COLUMN], axis=1)
-    return np.any(around.distance(points.reshape(-1, 3)).reshape(points.shape[:2]) < wide, axis=1)
+    return np.any(around.distance(points) < wide, axis=1)
 
 
 def _out_of_reach(world: PlannedWorld) -> Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n"]]:

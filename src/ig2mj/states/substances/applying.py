@@ -53,8 +53,8 @@ LAYER = 0.1
 
 
 def _of(model: StateModel, categories: tuple[str, ...]) -> Int[np.ndarray, "N"]:
-    wanted = [o for o, category in enumerate(model.tables.object_categories) if category in categories]
-    return np.array([o for o in wanted if of(model).row[o] < len(of(model).covered)], int)
+    found = [o for o, category in enumerate(model.tables.object_categories) if category in categories]
+    return np.array([o for o in found if of(model).row[o] < len(of(model).covered)], int)
 
 
 def absorbers(model: StateModel) -> Int[np.ndarray, "A"]:
@@ -66,8 +66,8 @@ def absorbers(model: StateModel) -> Int[np.ndarray, "A"]:
 def sprays(model: StateModel) -> Int[np.ndarray, "P"]:
     """Rows of containers that spray, on the C axis."""
     has_switch = model.parameters.has("toggleable")
-    wanted = [o for o in _of(model, SPRAYS) if has_switch[o]]
-    return np.flatnonzero(np.isin(of(model).containers.object, wanted))
+    sprays = [o for o in _of(model, SPRAYS) if has_switch[o]]
+    return np.flatnonzero(np.isin(of(model).containers.object, sprays))
 
 
 def dipped(step: EventStep) -> Bool[Array, "W A C"]:
