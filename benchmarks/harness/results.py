@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.harness.paths import RESULTS, ROOT, command_line
+from ig2mj.process.processors import available
 
 __all__ = ["RESULTS", "command", "keep_row", "keep_rows", "machine", "provenance", "save", "table"]
 
@@ -54,7 +55,7 @@ def machine(core: int) -> dict[str, Any]:
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
-        "cores_used": 1 if core >= 0 else os.cpu_count(),
+        "cores_used": 1 if core >= 0 else available(),
         "load_average": [round(v, 2) for v in os.getloadavg()] if hasattr(os, "getloadavg") else None,
         "system": f"{platform.system()} {platform.machine()}",
         "versions": versions,

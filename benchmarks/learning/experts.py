@@ -17,7 +17,6 @@ import concurrent.futures
 import contextlib
 import dataclasses
 import json
-import os
 import pathlib
 import subprocess
 import sys
@@ -27,6 +26,7 @@ from typing import Any
 from benchmarks.harness.pages import between
 from benchmarks.harness.paths import ROOT, environment, module
 from benchmarks.harness.results import RESULTS
+from ig2mj.process.processors import available
 
 ROWS = RESULTS / "experts" / "rows.jsonl"
 """What the table of docs/guide/experts.md is made of."""
@@ -234,7 +234,7 @@ def main() -> int:
     parser.add_argument("--variants", nargs="*", type=int, default=[0], help="of the objects; 0: the task's own")
     parser.add_argument("--episodes", type=int, default=200, help="held-out states of each case")
     parser.add_argument("--worlds", type=int, default=25, help="episodes of a part, side by side in one process")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--jobs", type=int, default=available())
     parser.add_argument("--minutes", type=float, default=60.0, help="after which it ends with what it has")
     parser.add_argument("--force", action="store_true", help="play what has been played, too")
     parser.add_argument("--out", type=pathlib.Path, default=ROWS.parent)

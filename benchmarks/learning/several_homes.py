@@ -15,7 +15,6 @@ import argparse
 import concurrent.futures
 import json
 import multiprocessing
-import os
 import pathlib
 import time
 from typing import Any
@@ -26,6 +25,7 @@ import ig2mj
 from benchmarks.harness.results import keep_row, machine, provenance
 from ig2mj.envs.experts import expert_of
 from ig2mj.errors import Ig2mjError
+from ig2mj.process.processors import available
 from ig2mj.scene.paths import shipped_homes
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.homes import in_home
@@ -191,7 +191,7 @@ def main() -> None:
         known = [json.loads(line) for line in args.out.read_text().splitlines()]
     jobs = [job for job in jobs if not any(all(row.get(k) == v for k, v in job.items()) for row in known)]
     context = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(args.jobs or os.cpu_count(), context) as workers:
+    with concurrent.futures.ProcessPoolExecutor(args.jobs or available(), context) as workers:
         rows = workers.map(done, jobs) if args.jobs != 1 else map(done, jobs)
         for row in rows:
             keep_row({**row, **provenance(), **machine(-1)}, args.out)

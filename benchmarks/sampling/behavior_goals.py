@@ -27,6 +27,7 @@ from typing import Any
 
 from benchmarks.harness.paths import ROOT
 from benchmarks.harness.results import provenance
+from ig2mj.process.processors import available
 
 RESULTS = ROOT / "benchmarks" / "results" / "behavior100"
 PAGE = ROOT / "docs" / "notes" / "behavior_goals.md"
@@ -62,7 +63,7 @@ def main() -> None:
     made_by = {**provenance(), "seconds": args.seconds}
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(
-        args.jobs or os.cpu_count(), context, initializer=quiet, max_tasks_per_child=ACTIVITIES
+        args.jobs or available(), context, initializer=quiet, max_tasks_per_child=ACTIVITIES
     ) as pool:
         running = {pool.submit(work, name, made_by=made_by): name for name in names}
         for done in concurrent.futures.as_completed(running):
