@@ -119,7 +119,7 @@ docs: setup
 homes-check: setup
 	@set -e; made=$$(mktemp -d); trap 'rm -rf "$$made"' EXIT; \
 	$(BIN)/ig2mj homes build --out $$made/dataset; \
-	IG2MJ_CACHE_DIR=$$made/cache $(BIN)/ig2mj homes convert --dataset $$made/dataset --out $$made/homes; \
+	IG2MJ_CACHE_DIR=$$made/cache $(BIN)/ig2mj homes convert --dataset $$made/dataset --out $$made/homes --jobs $(JOBS); \
 	$(BIN)/python -m ig2mj_homes.comparison $$made/homes scenes_mjcf; \
 	echo "scenes_mjcf/ is what this code builds and converts"
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 from ig2mj.errors import InputError
 from ig2mj.files.heartbeat import Heartbeat, is_alive
+from ig2mj.files.unfinished import unfinished
 
 #: A folder that holds this file is an earlier output and may be replaced.
 MARK = "manifest.json"
@@ -43,6 +44,21 @@ def replaced_folder(out: str | os.PathLike) -> Iterator[pathlib.Path]:
         raise InputError(target, f"cannot be written: {e.strerror or e}", element="--out") from e
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def put_shared_file(file: pathlib.Path, content: bytes) -> None:
+    """Writes a file that other outputs may share; one that has this content already is left alone.
+
+    A process that reads it at the same time finds all of it or nothing.
+    """
+    try:
+        if file.read_bytes() == content:
+            return
+    except FileNotFoundError:
+        file.parent.mkdir(parents=True, exist_ok=True)
+    part = unfinished(file)
+    part.write_bytes(content)
+    part.replace(file)
 
 
 def _check(target: pathlib.Path) -> None:

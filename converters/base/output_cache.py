@@ -28,7 +28,7 @@ from .cache_folder import cache_folder, prune
 from .inputs import Record
 from .options import ConvertOptions
 from .outcome import ConversionOutcome
-from .output import MARK, replaced_folder
+from .output import MARK, put_shared_file, replaced_folder
 
 LIMIT = 2 * 2**30
 """Bytes of all entries together."""
@@ -100,7 +100,7 @@ def fetch(key: str, out: str | os.PathLike) -> ConversionOutcome | None:
                 if hashlib.sha256((folder / MARK).read_bytes()).hexdigest() != outcome.manifest_hash:
                     raise ValueError("not the manifest that was kept")
                 for name, raw in shared.items():
-                    _put(folder / name, raw)
+                    put_shared_file(folder / name, raw)
         os.utime(path)
     except _DAMAGED:
         return None
@@ -135,16 +135,6 @@ def store(key: str, record: Record, outcome: ConversionOutcome, out: str | os.Pa
         if temporary is not None:
             with contextlib.suppress(OSError):
                 temporary.unlink()
-
-
-def _put(file: pathlib.Path, raw: bytes) -> None:
-    """Writes a file that other outputs may use too; one that has these bytes already is left alone."""
-    try:
-        if file.read_bytes() == raw:
-            return
-    except FileNotFoundError:
-        file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_bytes(raw)
 
 
 def _path(key: str) -> pathlib.Path:

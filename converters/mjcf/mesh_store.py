@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from ..base.naming import file_slug
+from ..base.output import put_shared_file
 
 #: Vertices are written in steps of 0.1 micrometre: far below any fit, and equal on every machine.
 _DECIMALS = 7
@@ -61,8 +62,7 @@ class MeshStore:
         name = self._names.get(key)
         if name is None:
             name = f"{file_slug(label)}-{key[:12]}"
-            self._folder.mkdir(parents=True, exist_ok=True)
-            (self._folder / f"{name}.obj").write_bytes(text)
+            put_shared_file(self._folder / f"{name}.obj", text)
             asset = self._spec.add_mesh(name=name, file=f"{name}.obj")
             kinds = mujoco.mjtMeshInertia
             asset.inertia = kinds.mjMESH_INERTIA_SHELL if surface else kinds.mjMESH_INERTIA_CONVEX

@@ -10,6 +10,7 @@ import mujoco
 from PIL import Image
 
 from ..base.naming import file_slug
+from ..base.output import put_shared_file
 from ..reading.images import ImageError, open_image
 from ..reading.looks import Texture, content_of
 
@@ -46,8 +47,7 @@ class TextureStore:
         name = f"{file_slug(pathlib.PurePath(image.name).stem, 40)}-{hashlib.sha256(data).hexdigest()[:12]}"
         if name not in self._names:
             self._names.add(name)
-            self._folder.mkdir(parents=True, exist_ok=True)
-            (self._folder / f"{name}.png").write_bytes(data)
+            put_shared_file(self._folder / f"{name}.png", data)
             self._spec.add_texture(name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, file=f"{name}.png")
             material = self._spec.add_material(name=name)
             material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name

@@ -16,6 +16,7 @@ import pytest
 from ig2mj_converters.base import inputs, output_cache
 from ig2mj_converters.base.cache_folder import prune
 from ig2mj_converters.base.options import ConvertOptions
+from ig2mj_converters.base.output import put_shared_file
 from ig2mj_converters.conversion import convert_object, convert_scene
 from PIL import Image
 from tiny_geometry import box, write_obj
@@ -279,3 +280,17 @@ def test_homes_with_shared_meshes_come_out_of_the_cache_with_them(own, tmp_path,
 
 def test_outputs_with_shared_meshes_have_entries_of_their_own():
     assert output_cache.key_of({}, dataclasses.replace(BARE, assets="..")) != output_cache.key_of({}, BARE)
+
+
+def test_a_shared_file_is_written_once_and_whole(tmp_path):
+    """Processes that convert models of one library share meshes: what is there is left alone, none is half-written."""
+    file = tmp_path / "meshes" / "cup-0123.obj"
+    put_shared_file(file, b"v 0 0 0\n")
+    os.utime(file, (1e9, 1e9))
+    put_shared_file(file, b"v 0 0 0\n")
+    assert file.stat().st_mtime == 1e9 and file.read_bytes() == b"v 0 0 0\n"
+    opened = file.open("rb")
+    put_shared_file(file, b"v 1 0 0\n")
+    assert opened.read() == b"v 0 0 0\n" and file.read_bytes() == b"v 1 0 0\n", "a reader keeps what it opened"
+    opened.close()
+    assert [f.name for f in file.parent.iterdir()] == [file.name]

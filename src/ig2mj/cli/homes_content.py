@@ -98,7 +98,7 @@ def convert(
             cached += convert_scene(dataset, name, out / name, options=options).cached
             failed += strip_report(out / name)
             bar.remove_task(bar.task_ids[-1])
-        added = 0 if home else _convert_objects(dataset, out, not no_cache, add_bar(bar, "objects"), failed)
+        added = 0 if home else _convert_objects(dataset, out, jobs, not no_cache, add_bar(bar, "objects"), failed)
     remove_unused(out)
     kept = f" ({cached} unchanged, taken from the cache)" if cached else ""
     megabytes = total_bytes(out) / 1e6
@@ -111,39 +111,50 @@ def convert(
 def _convert_objects(
     dataset: pathlib.Path,
     out: pathlib.Path,
+    jobs: int,
     cache: bool,
     progress: ProgressCallback,
     failed: list[str],
 ) -> int:
-    """Converts the object library; adds lines of failed checks to `failed`. How many models."""
+    """Converts the object library, a model per process; adds lines of failed checks to `failed`. How many models."""
+    import functools
     import json
 
-    from ig2mj_converters.base.options import ConvertOptions
-    from ig2mj_converters.conversion import convert_object
+    from ig2mj_converters.base.process_pool import TaskPool
     from ig2mj_homes.dataset.object_library import (
-        ASSETS,
         FOLDER,
         PREFERRED_FILE,
         VARIANTS_FILE,
-        is_fixed,
         library_models,
         preferred_models,
         split_models,
     )
-    from ig2mj_homes.dataset.ship import strip_report
 
     models = library_models(dataset)
-    for number, (category, model, urdf) in enumerate(models):
-        progress(number, len(models), category)
-        folder = out / FOLDER / category / model
-        options = ConvertOptions(assets=ASSETS, cache=cache, max_hulls=MAX_HULLS)
-        convert_object(urdf, category, folder, model=model, fixed=is_fixed(category), options=options)
-        failed += strip_report(folder, keep_checks=False)
+    with TaskPool(jobs) as pool:
+        found = pool.map(
+            functools.partial(_convert_object, out / FOLDER, cache), models, [model[0] for model in models], progress
+        )
+    failed += [line for lines in found for line in lines]
     for file, content in ((PREFERRED_FILE, preferred_models(models)), (VARIANTS_FILE, split_models(models))):
         if content:
             text = json.dumps(content, indent=1, sort_keys=True) + "\n"
             (out / FOLDER / file).write_text(text, encoding="utf-8", newline="\n")
     return len(models)
+
+
+def _convert_object(library: pathlib.Path, cache: bool, entry: tuple[str, str, pathlib.Path]) -> list[str]:
+    """Converts a model of the object library: (category, model, URDF). Lines of failed checks."""
+    from ig2mj_converters.base.options import ConvertOptions
+    from ig2mj_converters.conversion import convert_object
+    from ig2mj_homes.dataset.object_library import ASSETS, is_fixed
+    from ig2mj_homes.dataset.ship import strip_report
+
+    category, model, urdf = entry
+    folder = library / category / model
+    options = ConvertOptions(assets=ASSETS, cache=cache, max_hulls=MAX_HULLS)
+    convert_object(urdf, category, folder, model=model, fixed=is_fixed(category), options=options)
+    return strip_report(folder, keep_checks=False)
 
 
 def _scenes_of(dataset: pathlib.Path, requested: tuple[str, ...]) -> list[str]:
