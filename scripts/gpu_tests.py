@@ -3,166 +3,274 @@
     python scripts/gpu_tests.py [FILE ...] [--minutes N] [--jobs N] [--out FOLDER] [--again failed|all] [PYTEST_OPTION]
 
 `make test-gpu` runs it with the interpreter of `.venv`; `make test-gpu SETUP=no PYTHON=python3` with that one, and
-installs nothing. Tests that have ended are noted in the folder and not run again, as long as `src` and `tests` are
-what they were. At the end, and when `--minutes` are over, a summary names each file's tests and seconds, and the sum
-over all calls. Exit status: 0 where all tests have passed or were skipped, 1 where one failed, 3 where some are left.
+installs nothing. A test is noted in the folder as soon as it ends, and not run again as long as the code is what it
+was. `results.json` there has each test's outcome and seconds while tests still run, whatever ends this process. A test
+that ends its process has failed, and the file's next tests run in another. When `--minutes` are over, or at a signal,
+the tests that still run are stopped. Then a summary follows. Exit status: 0 where all tests have passed or were
+skipped, 1 where one failed, 3 where some are left.
 
-XLA splits its code into modules that are compiled side by side, and tries no variants of kernels: tests run programs a
-few times only. Compiled programs and kernels are kept in the folder and in Warp's cache.
+The files that take longest come first. All processes share one cache of compiled programs, which is in the folder, and
+Warp's cache of kernels. XLA tries no variants of kernels, since tests run programs a few times only.
 """
 
 from __future__ import annotations
 
 import argparse
 import collections
-import concurrent.futures
+import dataclasses
 import hashlib
 import json
 import os
 import pathlib
-import re
+import platform
 import signal
 import subprocess
 import sys
-import threading
 import time
+from typing import Any
+
+import test_journal
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 
-FLAGS = "--xla_gpu_enable_llvm_module_compilation_parallelism=true --xla_gpu_autotune_level=0"
+FLAGS = ("--xla_gpu_enable_llvm_module_compilation_parallelism=true", "--xla_gpu_autotune_level=0")
+"""Options of XLA that shorten compilation. XLA ends a process at one that it does not know, so each is tried first."""
 
-OUTCOME = re.compile(r"^(tests/\S+::.*?) (PASSED|FAILED|ERROR|SKIPPED|XFAIL|XPASS)\b", re.MULTILINE)
-"""A line of `pytest -v`."""
+LONGEST_FIRST = (
+    "tests/envs/test_navigation_on_a_gpu.py",
+    "tests/engine/test_warp_kernels.py",
+    "tests/worlds/test_batches_on_a_gpu.py",
+    "tests/engine/test_solver_loop.py",
+    "tests/docs/test_code_blocks.py",
+    "tests/tasks/custom/test_custom_tasks_on_warp.py",
+    "tests/sensors/test_lasers_on_a_gpu.py",
+    "tests/envs/test_array_faces.py",
+    "tests/engine/test_engines_come_and_go.py",
+    "tests/engine/test_convex_kernels.py",
+    "tests/engine/test_resting.py",
+    "tests/engine/test_kernels_of_a_step.py",
+)
+"""Files whose tests compile for over a minute, as measured on an H100. Others are short, or new."""
 
-GRACE = 20.0
+MOST_JOBS = 12
+"""Processes side by side. Each takes some GB of the GPU's memory and of the machine's."""
+
+TEST_SECONDS = 1200
+"""Limit of a test, with the compilation of its programs and kernels, which others may have to end first."""
+
+GRACE = 10.0
 """Seconds between SIGINT and SIGKILL."""
 
-NOTHING_SELECTED = 5
-"""pytest's exit status."""
+SAVE_SECONDS = 2.0
+"""Between two writings of results.json."""
+
+FAILED = ("failed", "crashed")
 
 
-class Parts:
-    """What ended so far, in a file of the folder: outcomes by test, seconds by file."""
+class Results:
+    """What ended so far: the journal of the present code, and results.json, which is made of it."""
 
     def __init__(self, folder: pathlib.Path, again: str | None):
         folder.mkdir(parents=True, exist_ok=True)
-        self._file, self._lock = folder / "results.json", threading.Lock()
-        of_code = digest()
-        self.kept = {"code": of_code, "outcomes": {}, "seconds": {}, "calls_s": []}
-        if self._file.exists() and again != "all":
-            kept = json.loads(self._file.read_text(encoding="utf-8"))
-            if kept.get("code") == of_code:
-                self.kept = kept
-            else:
-                print("src or tests have changed since the last call: all tests run again", file=sys.stderr)
+        self.code = digest()
+        self.journal = folder / f"journal-{self.code}.jsonl"
+        self._file = folder / "results.json"
+        self._about = {"code": self.code, "commit": said_by("git", "rev-parse", "HEAD"), "device": gpu()}
+        self._calls = self._read().get("calls_s", [])
+        self._began = time.monotonic()
+        if again == "all":
+            self.journal.unlink(missing_ok=True)
         if again == "failed":
-            passed = {test: word for test, word in self.outcomes.items() if word not in ("FAILED", "ERROR")}
-            self.kept["outcomes"] = passed
+            kept = [line for line in self.ended().values() if line["outcome"] not in FAILED]
+            self.journal.write_text("".join(json.dumps(line) + "\n" for line in kept), encoding="utf-8")
+        if not self.journal.exists():
+            self._calls = []
 
-    @property
-    def outcomes(self) -> dict[str, str]:
-        return self.kept["outcomes"]
+    def _read(self) -> dict[str, Any]:
+        if not self._file.exists():
+            return {}
+        found = json.loads(self._file.read_text(encoding="utf-8"))
+        if found["code"] != self.code:
+            print("the code has changed since the last call: all tests run again", file=sys.stderr)
+            return {}
+        return found
 
-    def add(self, file: str, text: str, seconds: float) -> None:
-        """What a process printed about a file."""
-        with self._lock:
-            self.outcomes.update(OUTCOME.findall(text))
-            self.kept["seconds"][file] = round(self.kept["seconds"].get(file, 0.0) + seconds, 1)
-            self.save()
+    def ended(self) -> dict[str, dict[str, Any]]:
+        return test_journal.ended(self.journal)
 
-    def save(self) -> None:
+    def begun(self, process: int) -> list[str]:
+        """Tests that this process has begun and that have no outcome."""
+        return [test for test, line in test_journal.read(self.journal).items() if line.get("process") == process]
+
+    def failed(self) -> list[str]:
+        return sorted(test for test, line in self.ended().items() if line["outcome"] in FAILED)
+
+    def calls(self) -> list[float]:
+        """Seconds of each call, this one included."""
+        return [*self._calls, round(time.monotonic() - self._began, 1)]
+
+    def save(self, left: list[str]) -> None:
+        tests = {test: {k: line[k] for k in ("outcome", "seconds")} for test, line in sorted(self.ended().items())}
+        counts = dict(collections.Counter(of_test["outcome"] for of_test in tests.values()))
+        text = {**self._about, "counts": counts, "calls_s": self.calls(), "files_left": left, "tests": tests}
         new = self._file.with_suffix(".new")
-        new.write_text(json.dumps(self.kept, indent=1), encoding="utf-8")
+        new.write_text(json.dumps(text, indent=1), encoding="utf-8")
         new.replace(self._file)
+
+
+@dataclasses.dataclass
+class Running:
+    """A process of pytest for what is left of a file."""
+
+    file: str
+    log: pathlib.Path
+    process: subprocess.Popen
+
+
+def said_by(*command: str) -> str:
+    """The first line that a command prints; nothing where it fails."""
+    try:
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=20)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return next(iter(done.stdout.splitlines()), "").strip() if done.returncode == 0 else ""
+
+
+def gpu() -> str:
+    return said_by("nvidia-smi", "--query-gpu=name", "--format=csv,noheader") or platform.machine()
 
 
 def digest() -> str:
     """Of the files that tests depend on."""
     found = hashlib.sha256()
-    for folder in ("src", "tests"):
-        for file in sorted((ROOT / folder).rglob("*.py")):
+    for folder, kind in (("src", "*.py"), ("tests", "*.py"), ("docs", "*.md")):
+        for file in sorted((ROOT / folder).rglob(kind)):
             found.update(str(file.relative_to(ROOT)).encode() + file.read_bytes())
     return found.hexdigest()[:16]
 
 
 def files() -> list[str]:
-    """Test files that have tests for a GPU, those that took longest at first."""
+    """Test files that have tests for a GPU, those that take longest first."""
     texts = {file: file.read_text(encoding="utf-8") for file in sorted((ROOT / "tests").rglob("test_*.py"))}
-    return [str(f.relative_to(ROOT)) for f, text in texts.items() if "mark.gpu" in text or "kernel_device" in text]
+    found = [str(f.relative_to(ROOT)) for f, text in texts.items() if "mark.gpu" in text or "kernel_device" in text]
+    places = {file: place for place, file in enumerate(LONGEST_FIRST)}
+    return sorted(found, key=lambda file: places.get(file, len(places)))
 
 
-def run_file(file: str, parts: Parts, until: float, args: argparse.Namespace) -> bool:
-    """Runs what is left of a file; whether all of it has ended. `until`: of `time.monotonic`."""
-    done = [test for test in parts.outcomes if test.startswith(f"{file}::")]
-    log = args.out / f"{pathlib.PurePath(file).stem}.txt"
-    words = [sys.executable, "-m", "pytest", "-m", "gpu", file, "-v", "--tb=short", "--durations=5"]
-    words += ["--timeout", "1800"]
-    words += ["-W", "default::DeprecationWarning", "-o", f"cache_dir={args.out / 'cache'}"]
-    words += [*(f"--deselect={test}" for test in done), *args.pytest]
-    flags = os.environ.get("XLA_FLAGS", "")
+def known_flags(flags: tuple[str, ...] = FLAGS) -> list[str]:
+    """Those of XLA's options that this version of it knows."""
+    program = [sys.executable, "-c", "import jax; jax.devices()"]
+
+    def try_out(flag: str) -> subprocess.Popen:
+        env = {**os.environ, "XLA_FLAGS": flag, "JAX_PLATFORMS": "cpu"}
+        return subprocess.Popen(program, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    tried = [(flag, try_out(flag)) for flag in flags]
+    return [flag for flag, process in tried if process.wait() == 0]
+
+
+def environment(journal: pathlib.Path) -> dict[str, str]:
     env = {
         **os.environ,
+        test_journal.VARIABLE: str(journal),
         "JAX_PLATFORMS": "cuda,cpu",
+        "PYTHONPATH": os.pathsep.join([str(ROOT / "scripts"), *filter(None, [os.environ.get("PYTHONPATH")])]),
+        "PYTHONUNBUFFERED": "1",
         "XLA_PYTHON_CLIENT_PREALLOCATE": "false",
-        "XLA_FLAGS": f"{FLAGS} {flags}".strip(),
+        "XLA_FLAGS": " ".join([*known_flags(), *os.environ.get("XLA_FLAGS", "").split()]),
     }
     env.pop("XLA_PYTHON_CLIENT_MEM_FRACTION", None)
-    began = time.monotonic()
-    if began >= until:
+    return env
+
+
+def start(file: str, out: pathlib.Path, env: dict[str, str], options: list[str]) -> Running:
+    log = out / f"{pathlib.PurePath(file).stem}.txt"
+    words = [sys.executable, "-X", "faulthandler", "-m", "pytest", "-p", "test_journal", "-m", "gpu", file, "-v"]
+    words += ["--tb=short", "--durations=5", f"--timeout={TEST_SECONDS}", "-W", "default::DeprecationWarning"]
+    words += ["-o", f"cache_dir={out / 'cache'}", *options]
+    with log.open("a", encoding="utf-8") as said:
+        return Running(file, log, subprocess.Popen(words, cwd=ROOT, env=env, stdout=said, stderr=said))
+
+
+def end(running: Running, results: Results) -> bool:
+    """Notes what a process did not say itself; whether all of its file has ended."""
+    status = running.process.returncode
+    said = running.log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    print(f"{running.file}: {said[-1].strip('= ') if said else 'no output'}", flush=True)
+    crashed = results.begun(running.process.pid)
+    for test in crashed:
+        test_journal.note(results.journal, test=test, outcome="crashed", seconds=0.0, log=running.log.name)
+    if crashed:
         return False
-    with log.open("w", encoding="utf-8") as said:
-        process = subprocess.Popen(words, cwd=ROOT, env=env, stdout=said, stderr=said)
+    if status not in (0, 1, 5):  # passed, failed, and nothing was left
+        test = f"{running.file}::pytest ended with status {status}"
+        test_journal.note(results.journal, test=test, outcome="crashed", seconds=0.0, log=running.log.name)
+    return True
+
+
+def run_all(waiting: list[str], results: Results, until: float, args: argparse.Namespace) -> list[str]:
+    """Runs files; those that have not ended by `until` (of `time.monotonic`) or at a signal."""
+    stopped: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, frame: stopped.append(number))
+    env, running, saved = environment(results.journal), [], 0.0
+    while (waiting or running) and time.monotonic() < until and not stopped:
+        while waiting and len(running) < args.jobs:
+            running.append(start(waiting.pop(0), args.out, env, args.pytest))
+        for one in [one for one in running if one.process.poll() is not None]:
+            running.remove(one)
+            if not end(one, results):
+                waiting.insert(0, one.file)
+        if time.monotonic() > saved + SAVE_SECONDS:
+            results.save([one.file for one in running] + waiting)
+            saved = time.monotonic()
+        time.sleep(0.1)
+    for one in running:
+        one.process.send_signal(signal.SIGINT)
+    killed_at = time.monotonic() + GRACE
+    for one in running:
         try:
-            process.wait(until - began)
+            one.process.wait(max(0.0, killed_at - time.monotonic()))
         except subprocess.TimeoutExpired:
-            process.send_signal(signal.SIGINT)
-            try:
-                process.wait(GRACE)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-    parts.add(file, log.read_text(encoding="utf-8", errors="replace"), time.monotonic() - began)
-    print(f"{file}: {(log.read_text(errors='replace').strip().splitlines() or ['?'])[-1].strip('= ')}", flush=True)
-    return process.returncode in (0, 1, NOTHING_SELECTED)
+            one.process.kill()
+            one.process.wait()
+    return [one.file for one in running] + waiting
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    cores = len(os.sched_getaffinity(0))
     parser.add_argument("--minutes", type=float, default=60.0, help="time limit of this call")
-    parser.add_argument("--jobs", type=int, default=max(1, min(8, len(os.sched_getaffinity(0)) // 2)))
+    parser.add_argument("--jobs", type=int, default=max(1, min(MOST_JOBS, cores * 3 // 4)), help="processes")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "out" / "gpu-tests")
     parser.add_argument("--again", choices=("failed", "all"), help="run these again")
     args, rest = parser.parse_known_args()
     chosen, args.pytest = ([word for word in rest if word.endswith(".py") is end] for end in (True, False))
     args.out = args.out.resolve()
-    began, parts = time.monotonic(), Parts(args.out, args.again)
-    until = began + 60 * args.minutes
-    seconds = parts.kept["seconds"]
-    order = sorted(chosen or files(), key=lambda file: -seconds.get(file, 1e9))
-    with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
-        ended = list(pool.map(lambda file: run_file(file, parts, until, args), order))
-    parts.kept["calls_s"].append(round(time.monotonic() - began, 1))
-    parts.save()
-    return summary(parts, [file for file, whole in zip(order, ended, strict=True) if not whole])
+    until = time.monotonic() + 60 * args.minutes
+    results = Results(args.out, args.again)
+    left = run_all(chosen or files(), results, until, args)
+    results.save(left)
+    return summary(results, left)
 
 
-def summary(parts: Parts, left: list[str]) -> int:
+def summary(results: Results, left: list[str]) -> int:
     """Prints what ended; the exit status."""
-    by_file: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
-    for test, word in parts.outcomes.items():
-        by_file[test.split("::")[0]][word] += 1
-    for file in sorted(by_file):
-        counts = ", ".join(f"{n} {word.lower()}" for word, n in sorted(by_file[file].items()))
-        print(f"{parts.kept['seconds'].get(file, 0.0):7.1f} s  {file}: {counts}")
-    failed = sorted(test for test, word in parts.outcomes.items() if word in ("FAILED", "ERROR"))
-    for test in failed:
+    by_file: dict[str, list[dict[str, Any]]] = collections.defaultdict(list)
+    for test, line in results.ended().items():
+        by_file[test.split("::")[0]].append(line)
+    for file, lines in sorted(by_file.items()):
+        counts = collections.Counter(line["outcome"] for line in lines)
+        text = ", ".join(f"{n} {outcome}" for outcome, n in sorted(counts.items()))
+        print(f"{sum(line['seconds'] for line in lines):7.1f} s  {file}: {text}")
+    for test in results.failed():
         print(f"FAILED {test}")
     for file in left:
         print(f"not ended: {file} (the same command goes on)")
-    total = collections.Counter(parts.outcomes.values())
-    calls = parts.kept["calls_s"]
+    total = collections.Counter(line["outcome"] for lines in by_file.values() for line in lines)
+    calls = results.calls()
     print(f"{dict(total)} in {sum(calls):.0f} s ({len(calls)} calls)")
-    return 1 if failed else 3 if left else 0
+    return 1 if results.failed() else 3 if left else 0
 
 
 if __name__ == "__main__":
