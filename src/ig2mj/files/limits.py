@@ -32,8 +32,8 @@ DEFAULTS = {
     "GROUNDED_PARTS": 20_000,
     "BDDL_OBJECTS": 1_000,
 }
-"""By name without `PREFIX`. Deflate packs at most 1032 bytes into one; pools and recordings that the project makes, and
-images of rooms, have 1 to 60."""
+"""By name without `PREFIX`. Deflate packs at most 1032 bytes into one; recordings that the project makes, and images
+of rooms, have 1 to 60. Pools of thousands of rows would have more: `ig2mj.files.npz.write_npz` packs them less."""
 
 PREFIX = "IG2MJ_LIMIT_"
 
@@ -60,6 +60,11 @@ def refuse_more(name: str, size: int, what: str, file: object, element: str = ""
 def refuse_bomb(unpacked: int, packed: int, file: object) -> None:
     """Raises InputError where a file of `packed` bytes claims more unpacked bytes than one reads of such a file."""
     refuse_more("UNPACKED_BYTES", unpacked, "holds arrays of", file)
-    if unpacked > max(limit("SMALL_BYTES"), packed * limit("UNPACKED_RATIO")):
+    if is_bomb(unpacked, packed):
         fix = f"{PREFIX}UNPACKED_RATIO={-(-unpacked // max(packed, 1))} reads it, if you trust it"
         raise InputError(file, f"has {packed} bytes and claims arrays of {unpacked} bytes", fix=fix)
+
+
+def is_bomb(unpacked: int, packed: int) -> bool:
+    """Whether a file of `packed` bytes claims more unpacked bytes than its size explains."""
+    return unpacked > max(limit("SMALL_BYTES"), packed * limit("UNPACKED_RATIO"))

@@ -1,4 +1,4 @@
-"""`read_npz`: arrays of an npz archive, whose declared sizes are checked before anything is unpacked.
+"""`read_npz`: arrays of an npz archive, whose declared sizes are checked before anything is unpacked; `write_npz`.
 
 No pickle: arrays are of numbers, truth values or text. What is unpacked is what the archive's directory declares, and
 that is what each array's own header says.
@@ -13,14 +13,14 @@ import os
 import pathlib
 import struct
 import zipfile
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Container, Mapping
+from typing import IO, Any
 
 import numpy as np
 
 from ig2mj.errors import Ig2mjError, InputError
 from ig2mj.files.content import regular_file
-from ig2mj.files.limits import refuse_bomb, refuse_more
+from ig2mj.files.limits import is_bomb, limit, refuse_bomb, refuse_more
 
 KINDS = "biufUS"
 """Kinds of dtypes that are read: truth values, whole numbers, floating-point numbers, text."""
@@ -71,6 +71,48 @@ def read_npz(
         raise InputError(said, f"cannot be read: {e.strerror or e}", fix=fix) from e
     except Exception as e:  # zipfile, zlib and NumPy raise whatever a damaged archive makes them stumble over
         raise InputError(said, f"is not an npz archive, or a damaged one: {e or type(e).__name__}", fix=fix) from e
+
+
+def write_npz(stream: IO[bytes], arrays: Mapping[str, np.ndarray]) -> None:
+    """Writes a compressed archive that `read_npz` reads under the limits in force.
+
+    Rows of start states that are alike pack to less than `IG2MJ_LIMIT_UNPACKED_RATIO` allows, as archives that are made
+    to fill the memory do. The archive then has some arrays, as few bytes as are needed, without compression.
+
+    Args:
+      stream: a file that is open for writing and can be searched.
+      arrays: by name; of numbers, truth values or text.
+    """
+    start = stream.tell()
+    unpacked = _write(stream, arrays, set())
+    if is_bomb(unpacked, stream.tell() - start):
+        stream.seek(start)
+        stream.truncate()
+        _write(stream, arrays, _of_bytes(arrays, -(-unpacked // limit("UNPACKED_RATIO"))))
+
+
+def _write(stream: IO[bytes], arrays: Mapping[str, np.ndarray], stored: Container[str]) -> int:
+    """Writes an archive whose arrays named in `stored` are not compressed. Bytes of what it unpacks to."""
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in arrays.items():
+            entry = zipfile.ZipInfo(f"{name}.npy")
+            entry.compress_type = zipfile.ZIP_STORED if name in stored else zipfile.ZIP_DEFLATED
+            with archive.open(entry, "w", force_zip64=True) as opened:
+                np.lib.format.write_array(opened, np.asanyarray(array), allow_pickle=False)
+        return sum(entry.file_size for entry in archive.infolist())
+
+
+def _of_bytes(arrays: Mapping[str, np.ndarray], needed: int) -> set[str]:
+    """Names of arrays that have at least `needed` bytes together: the smallest one that has, else the largest ones."""
+    by_size = sorted(arrays, key=lambda name: arrays[name].nbytes)
+    alone = next((name for name in by_size if arrays[name].nbytes >= needed), None)
+    if alone is not None:
+        return {alone}
+    chosen: set[str] = set()
+    while by_size and needed > 0:
+        chosen.add(by_size[-1])
+        needed -= arrays[by_size.pop()].nbytes
+    return chosen
 
 
 def _check_directory(stream: Any, size: int, file: object) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ig2mj.errors import InputError
 from ig2mj.files.content import decode_struct
-from ig2mj.files.npz import read_npz, refuse_nonfinite
+from ig2mj.files.npz import read_npz, refuse_nonfinite, write_npz
 from ig2mj.files.unfinished import unfinished
 
 HEADER = "header"
@@ -46,7 +46,7 @@ def pack(tree: Any, header: dict[str, Any]) -> bytes:
     with io.BytesIO() as out:
         arrays = {name_of(keys): np.asarray(leaf) for keys, leaf in jax.tree_util.tree_flatten_with_path(tree)[0]}
         arrays[HEADER] = np.frombuffer(msgspec.json.encode(header), np.uint8)
-        np.savez_compressed(out, allow_pickle=False, **arrays)
+        write_npz(out, arrays)
         return out.getvalue()
 
 
