@@ -9,8 +9,9 @@ that ends its process has failed, and the file's next tests run in another. When
 the tests that still run are stopped. Then a summary follows. Exit status: 0 where all tests have passed or were
 skipped, 1 where one failed, 3 where some are left.
 
-The files that take longest come first. All processes share one cache of compiled programs, which is in the folder, and
-Warp's cache of kernels. XLA tries no variants of kernels, since tests run programs a few times only.
+What takes longest comes first; some tests have a process of their own. All processes share one cache of compiled
+programs, which is in the folder, and Warp's cache of kernels. XLA tries no variants of kernels, since tests run
+programs a few times only.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import json
 import os
 import pathlib
 import platform
+import re
 import signal
 import subprocess
 import sys
@@ -40,17 +42,22 @@ LONGEST_FIRST = (
     "tests/envs/test_navigation_on_a_gpu.py",
     "tests/engine/test_warp_kernels.py",
     "tests/worlds/test_batches_on_a_gpu.py",
+    "tests/docs/test_code_blocks.py::test_the_python_of_a_page_runs_on_a_gpu[docs/guide/learning.md]",
     "tests/engine/test_solver_loop.py",
-    "tests/docs/test_code_blocks.py",
     "tests/tasks/custom/test_custom_tasks_on_warp.py",
-    "tests/sensors/test_lasers_on_a_gpu.py",
+    "tests/docs/test_code_blocks.py",
     "tests/envs/test_array_faces.py",
+    "tests/envs/test_navigation_on_a_gpu.py::test_fetch_reaches_and_rearranges_on_warp",
     "tests/engine/test_engines_come_and_go.py",
+    "tests/sensors/test_lasers_on_a_gpu.py",
+    "tests/sensors/test_lasers_on_a_gpu.py::test_lasers_of_a_batch_are_those_of_the_native_engine[Fetch]",
     "tests/engine/test_convex_kernels.py",
     "tests/engine/test_resting.py",
+    "tests/engine/test_bench_on_a_gpu.py",
     "tests/engine/test_kernels_of_a_step.py",
 )
-"""Files whose tests compile for over a minute, as measured on an H100. Others are short, or new."""
+"""What compiles for over a minute on an H100, the longest first; other files are short, or new. Tests in this list get
+a process of their own, since they share nothing that takes long with others of their files."""
 
 MOST_JOBS = 12
 """Processes side by side. Each takes some GB of the GPU's memory and of the machine's."""
@@ -112,7 +119,7 @@ class Results:
     def save(self, left: list[str]) -> None:
         tests = {test: {k: line[k] for k in ("outcome", "seconds")} for test, line in sorted(self.ended().items())}
         counts = dict(collections.Counter(of_test["outcome"] for of_test in tests.values()))
-        text = {**self._about, "counts": counts, "calls_s": self.calls(), "files_left": left, "tests": tests}
+        text = {**self._about, "counts": counts, "calls_s": self.calls(), "left": left, "tests": tests}
         new = self._file.with_suffix(".new")
         new.write_text(json.dumps(text, indent=1), encoding="utf-8")
         new.replace(self._file)
@@ -120,9 +127,9 @@ class Results:
 
 @dataclasses.dataclass
 class Running:
-    """A process of pytest for what is left of a file."""
+    """A process of pytest for what is left of a part."""
 
-    file: str
+    part: str
     log: pathlib.Path
     process: subprocess.Popen
 
@@ -149,12 +156,17 @@ def digest() -> str:
     return found.hexdigest()[:16]
 
 
+def parts(chosen: list[str]) -> list[str]:
+    """Files, and tests of theirs that run on their own, those that take longest first."""
+    places = {part: place for place, part in enumerate(LONGEST_FIRST)}
+    found = chosen + [part for part in LONGEST_FIRST if "::" in part and part.split("::")[0] in chosen]
+    return sorted(found, key=lambda part: places.get(part, len(places)))
+
+
 def files() -> list[str]:
-    """Test files that have tests for a GPU, those that take longest first."""
+    """Test files that have tests for a GPU."""
     texts = {file: file.read_text(encoding="utf-8") for file in sorted((ROOT / "tests").rglob("test_*.py"))}
-    found = [str(f.relative_to(ROOT)) for f, text in texts.items() if "mark.gpu" in text or "kernel_device" in text]
-    places = {file: place for place, file in enumerate(LONGEST_FIRST)}
-    return sorted(found, key=lambda file: places.get(file, len(places)))
+    return [str(f.relative_to(ROOT)) for f, text in texts.items() if "mark.gpu" in text or "kernel_device" in text]
 
 
 def known_flags(flags: tuple[str, ...] = FLAGS) -> list[str]:
@@ -183,33 +195,34 @@ def environment(journal: pathlib.Path) -> dict[str, str]:
     return env
 
 
-def start(file: str, out: pathlib.Path, env: dict[str, str], options: list[str]) -> Running:
-    log = out / f"{pathlib.PurePath(file).stem}.txt"
-    words = [sys.executable, "-X", "faulthandler", "-m", "pytest", "-p", "test_journal", "-m", "gpu", file, "-v"]
+def start(part: str, out: pathlib.Path, env: dict[str, str], options: list[str]) -> Running:
+    log = out / f"{re.sub('[^a-zA-Z0-9]+', '_', part.removeprefix('tests/'))[:100]}.txt"
+    words = [sys.executable, "-X", "faulthandler", "-m", "pytest", "-p", "test_journal", "-m", "gpu", part, "-v"]
+    words += [f"--deselect={other}" for other in LONGEST_FIRST if other.startswith(f"{part}::")]
     words += ["--tb=short", "--durations=5", f"--timeout={TEST_SECONDS}", "-W", "default::DeprecationWarning"]
     words += ["-o", f"cache_dir={out / 'cache'}", *options]
     with log.open("a", encoding="utf-8") as said:
-        return Running(file, log, subprocess.Popen(words, cwd=ROOT, env=env, stdout=said, stderr=said))
+        return Running(part, log, subprocess.Popen(words, cwd=ROOT, env=env, stdout=said, stderr=said))
 
 
 def end(running: Running, results: Results) -> bool:
-    """Notes what a process did not say itself; whether all of its file has ended."""
+    """Notes what a process did not say itself; whether all of its part has ended."""
     status = running.process.returncode
     said = running.log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    print(f"{running.file}: {said[-1].strip('= ') if said else 'no output'}", flush=True)
+    print(f"{running.part}: {said[-1].strip('= ') if said else 'no output'}", flush=True)
     crashed = results.begun(running.process.pid)
     for test in crashed:
         test_journal.note(results.journal, test=test, outcome="crashed", seconds=0.0, log=running.log.name)
     if crashed:
         return False
     if status not in (0, 1, 5):  # passed, failed, and nothing was left
-        test = f"{running.file}::pytest ended with status {status}"
+        test = f"{running.part}::pytest ended with status {status}"
         test_journal.note(results.journal, test=test, outcome="crashed", seconds=0.0, log=running.log.name)
     return True
 
 
 def run_all(waiting: list[str], results: Results, until: float, args: argparse.Namespace) -> list[str]:
-    """Runs files; those that have not ended by `until` (of `time.monotonic`) or at a signal."""
+    """Runs parts; those that have not ended by `until` (of `time.monotonic`) or at a signal."""
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: stopped.append(number))
@@ -220,9 +233,9 @@ def run_all(waiting: list[str], results: Results, until: float, args: argparse.N
         for one in [one for one in running if one.process.poll() is not None]:
             running.remove(one)
             if not end(one, results):
-                waiting.insert(0, one.file)
+                waiting.insert(0, one.part)
         if time.monotonic() > saved + SAVE_SECONDS:
-            results.save([one.file for one in running] + waiting)
+            results.save([one.part for one in running] + waiting)
             saved = time.monotonic()
         time.sleep(0.1)
     for one in running:
@@ -234,7 +247,7 @@ def run_all(waiting: list[str], results: Results, until: float, args: argparse.N
         except subprocess.TimeoutExpired:
             one.process.kill()
             one.process.wait()
-    return [one.file for one in running] + waiting
+    return [one.part for one in running] + waiting
 
 
 def main() -> int:
@@ -249,7 +262,7 @@ def main() -> int:
     args.out = args.out.resolve()
     until = time.monotonic() + 60 * args.minutes
     results = Results(args.out, args.again)
-    left = run_all(chosen or files(), results, until, args)
+    left = run_all(parts(chosen or files()), results, until, args)
     results.save(left)
     return summary(results, left)
 
@@ -265,8 +278,8 @@ def summary(results: Results, left: list[str]) -> int:
         print(f"{sum(line['seconds'] for line in lines):7.1f} s  {file}: {text}")
     for test in results.failed():
         print(f"FAILED {test}")
-    for file in left:
-        print(f"not ended: {file} (the same command goes on)")
+    for part in left:
+        print(f"not ended: {part} (the same command goes on)")
     total = collections.Counter(line["outcome"] for lines in by_file.values() for line in lines)
     calls = results.calls()
     print(f"{dict(total)} in {sum(calls):.0f} s ({len(calls)} calls)")

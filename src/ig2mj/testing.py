@@ -23,7 +23,7 @@ from ig2mj.sensors.registry import sensor_named
 from ig2mj.tasks.custom.objective import CustomObjective
 
 SOON = 3
-"""Steps of the short episodes in which the end of an episode is looked at."""
+"""Steps before the horizon at which the end of an episode is looked at."""
 
 ROUNDING = 1e-5
 """By which numbers of one world may differ that two programs computed."""
@@ -191,20 +191,28 @@ def _partial_reset(env: Environment, seed: int, actions: list[np.ndarray], like:
 
 
 def _ends(env: Environment, seed: int, action: Float[np.ndarray, "W n"], like: Likeness) -> None:
-    """Short episodes: the horizon truncates, and `final_obs` is what was seen before."""
-    short = env.with_horizon(SOON)
-    state = short.reset(seed)
-    for _ in range(SOON):
-        state = short.step(state, action)
+    """The horizon truncates, and `final_obs` is what was seen before."""
+    soon = min(SOON, env.task.horizon)
+    state = _aged(env, env.reset(seed), env.task.horizon - soon)
+    for _ in range(soon):
+        state = env.step(state, action)
     last = _host(state)
-    state = short.reset(seed)
-    for _ in range(SOON):
-        state = short.step_autoreset(state, action)
+    state = _aged(env, env.reset(seed), env.task.horizon - soon)
+    for _ in range(soon):
+        state = env.step_autoreset(state, action)
     over = last["terminated"] | last["truncated"]
     assert over.all(), "episodes do not end at the horizon"
     assert (last["truncated"] == ~last["terminated"]).all(), "the horizon terminates instead of truncating"
     _same(last["obs"], jax.tree.map(np.array, state.info["final_obs"]), "final_obs", like)
     assert (np.asarray(state.batch.world.step) == 0).all(), "autoreset did not start a new episode"
+
+
+def _aged(env: Environment, state: EnvState, steps: int) -> EnvState:
+    """The same state so many agent steps later in its episodes. With another horizon all would be compiled again."""
+    engine, world = env.core.engine, state.batch.world
+    control_steps = np.int32(steps * round(env.period / (engine.substeps * engine.timestep)))
+    world = dataclasses.replace(world, step=world.step + control_steps)
+    return dataclasses.replace(state, batch=dataclasses.replace(state.batch, world=world))
 
 
 def _bad_actions(env: Environment, seed: int, like: Likeness) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -70,6 +71,16 @@ def write(place: pathlib.Path, **texts: str) -> None:
 def outcomes(place: pathlib.Path) -> dict[str, str]:
     tests = json.loads((place / "out" / "results.json").read_text(encoding="utf-8"))["tests"]
     return {test.split("::")[1]: of_test["outcome"] for test, of_test in tests.items()}
+
+
+def test_what_takes_longest_is_there(repository, monkeypatch):
+    monkeypatch.syspath_prepend(repository / "scripts")
+    import gpu_tests
+
+    for part in gpu_tests.LONGEST_FIRST:
+        file, *test = re.split(r"::|\[", part)
+        assert file in gpu_tests.files()
+        assert not test or f"def {test[0]}(" in (repository / file).read_text(encoding="utf-8"), part
 
 
 def test_a_crash_is_a_failure_and_the_file_goes_on(place):

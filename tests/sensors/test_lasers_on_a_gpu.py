@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import copy
+import functools
+
 import numpy as np
 import pytest
 from perceiving import Perceiving
 
+from ig2mj.agents.base import Robot
 from ig2mj.agents.fetch import Fetch
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.engine.base import Write
 
 pytestmark = [pytest.mark.gpu, pytest.mark.timeout(900), pytest.mark.usefixtures("gpu")]
 
-WORLDS = 64
+WORLDS, START = 64, (1.2, -1.2, 0)
 LASERS = ("scan", "lidar", "occupancy_grid")
 OPTIONS = {"scan_rays": 121, "scan_angle": 240.0, "lidar_columns": 40}
 SIDES = {"scan": 1e-3, "lidar": 5e-3, "occupancy_grid": 0.1}
@@ -25,10 +29,15 @@ def alike(native: np.ndarray, warp: np.ndarray, name: str) -> bool:
     return bool((np.abs(native.astype(float) - warp.astype(float)) <= SIDES[name]).mean() >= SHARE[name])
 
 
+@functools.cache
+def batch(kind: type[Robot]) -> Perceiving:
+    """The robot in all worlds of the Warp engine; made once, since it compiles for a minute."""
+    return Perceiving("birch", kind(pos=START), "warp", WORLDS)
+
+
 @pytest.mark.parametrize("kind", [TurtleBot, Fetch])
 def test_lasers_of_a_batch_are_those_of_the_native_engine(kind):
-    robot = kind(pos=(1.2, -1.2, 0))
-    native, warp = Perceiving("birch", robot), Perceiving("birch", robot, "warp", WORLDS)
+    native, warp = Perceiving("birch", kind(pos=START)), batch(kind)
     # Warp's worlds begin 0.3 s after the native one's: Fetch has come to rest on its wheels, 6 mm higher and tilted.
     native.physics = native.engine.load(native.physics, warp.engine.export(warp.physics, 0))
     here, there = native.see(*LASERS, **OPTIONS), warp.see(*LASERS, **OPTIONS)
@@ -41,8 +50,7 @@ def test_lasers_of_a_batch_are_those_of_the_native_engine(kind):
 
 def test_each_world_sees_its_own(gpu):
     """A chair before the laser in every other world shortens the rays there, and there only."""
-    robot = TurtleBot(pos=(1.2, -1.2, 0))
-    warp = Perceiving("birch", robot, "warp", WORLDS)
+    warp = copy.copy(batch(TurtleBot))  # with physics of its own
     free = warp.see("scan", **OPTIONS)["scan"]
     tables, view = warp.scene.tables, warp.engine.view(warp.physics)
     loose = np.flatnonzero(~tables.object_fixed & ~tables.object_parked)

@@ -1,16 +1,11 @@
-"""Batches on a CUDA device (`make test-gpu`): parity, reproducibility, measured buffers, one world of many natively.
-
-Programs are kept by JAX and Warp; with warm caches the file takes a few minutes.
-"""
+"""A home with a hand in many worlds on a CUDA device (`make test-gpu`): measured buffers, reproducibility, resets, one
+world of many on the native engine."""
 
 from __future__ import annotations
 
 import dataclasses
 
-import bench_scene
-import engine_bench
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -30,56 +25,6 @@ from ig2mj.worlds import Core, Rules
 pytestmark = [pytest.mark.gpu, pytest.mark.timeout(900), pytest.mark.usefixtures("gpu")]
 
 HOME, WORLDS, STEPS = "aspen", 256, 240
-
-
-@pytest.fixture(scope="module")
-def on_gpu(bench_folder, gpu) -> engine_bench.Bench:
-    """Table, box and knife in two worlds. Not the session's own bench, which may have been made on the CPU."""
-    return engine_bench.Bench(engine_bench.bench_home(bench_folder, True), "warp", 2)
-
-
-def test_one_step_on_the_gpu_is_one_step_of_c_mujoco(bench_folder, on_gpu):
-    """Kinematics to 1e-5 m; velocities to 1e-3 m/s. The knife tips over, the box slides."""
-    native = engine_bench.Bench(on_gpu.scene, "native", 2, substeps=1)
-    physics = native.write(native.fresh(), native.teleport("knife", [0.02, 0, 0.53], [0.924, 0, 0.3827, 0]))
-    physics, _ = native.run(physics, 24)
-    row = native.engine.export(physics, 0)
-    row.qvel[:2] += [0.3, 0.1]
-    physics, expected = native.step(native.fresh(row))
-    after, view = on_gpu.physics_step(on_gpu.fresh(row))
-    for field in ("body_pos", "body_quat", "object_com", "aabb_low", "aabb_high"):
-        np.testing.assert_allclose(getattr(view, field), getattr(expected, field), atol=1e-5, err_msg=field)
-    np.testing.assert_array_equal(view.touching, expected.touching)
-    got = on_gpu.engine.export(after, 0)
-    np.testing.assert_allclose(got.qvel, native.engine.export(physics, 0).qvel, atol=1e-3)
-
-
-def test_a_weld_toggled_in_one_world_moves_nothing_in_the_others_on_the_gpu(on_gpu):
-    start, _ = on_gpu.run(on_gpu.fresh(), 40)
-    row = on_gpu.engine.export(start, 0)
-    physics = on_gpu.write(on_gpu.fresh(row), on_gpu.switch({"knife/box": [1]}))
-    _, welded = on_gpu.run(physics, 10)
-    place = np.asarray(welded.object_pos)
-    address = on_gpu.scene.model.joint("box/free").qposadr[0]
-    assert np.abs(place[0, on_gpu.index("box")] - row.qpos[address : address + 3]).max() < 1e-4
-    assert np.abs(place[1] - place[0]).max() > 0.01
-
-
-def test_a_sleeper_on_the_gpu_wakes_when_something_falls_on_it(on_gpu):
-    start, view = on_gpu.run(on_gpu.fresh(), 60)
-    assert not np.asarray(view.awake).any()
-    row = on_gpu.engine.export(start, 0)
-    physics = on_gpu.write(on_gpu.fresh(row), on_gpu.teleport("knife", [0, 0, 0.56], worlds=[0]))
-    woke = np.zeros(2, bool)
-    for _ in range(10):
-        physics, view = on_gpu.step(physics)
-        woke |= on_gpu.awake(view, "box")
-    assert woke.tolist() == [True, False]
-    physics, view = on_gpu.run(physics, 60)
-    assert on_gpu.z(view, "box") == pytest.approx(bench_scene.TOP + bench_scene.HALF, abs=2e-3)
-
-
-# A home with a hand.
 
 
 @pytest.fixture(scope="module")
@@ -119,32 +64,47 @@ def batch_of_many(scene, model, pool, profile) -> Core:
     return make(scene, model, pool, profile, WORLDS)
 
 
-def rollout(worlds: Core, reach, batch, length: int):
-    """Control steps with a hand that pushes, in one program; the batch after them, and what was ever flagged."""
-    engine = worlds.engine
-    seconds = engine.substeps * engine.timestep
+class Pushing:
+    """Control steps with a hand that pushes; flagged worlds begin again. One program for any number of steps."""
 
-    def body(carry, _):
-        batch, pusher, com, palm, ever = carry
-        pusher = push(reach, pusher, com, palm, batch.world.key, batch.world.step, seconds)
-        batch, _ = worlds.step_fn(batch, pusher.ctrl)
-        view = batch.world.view
-        ever |= batch.world.physics.overflow
-        return (batch, pusher, view.object_com, view.agent.base_pos[:, 0], ever), None
+    def __init__(self, core: Core, reach):
+        self.core, self.reach = core, reach
+        self._several = jax.jit(self._several_fn)
 
-    view = batch.world.view
-    pusher = start_pushing(reach, engine.num_worlds, engine.host_model.nu)
-    carry = (batch, pusher, view.object_com, view.agent.base_pos[:, 0], jnp.zeros(engine.num_worlds, jnp.int32))
-    carry = jax.jit(lambda c: jax.lax.scan(body, c, None, length)[0])(carry)
-    return carry[0], np.asarray(carry[4])
+    def __call__(self, batch, steps: int):
+        """The batch after these steps; what overflowed in any of them and which worlds the last one flagged, [W]."""
+        engine = self.core.engine
+        pusher = start_pushing(self.reach, engine.num_worlds, engine.host_model.nu)
+        none = np.zeros(engine.num_worlds, np.int32)
+        batch, _, ever, flagged = self._several((batch, pusher, none, none.astype(bool)), np.int32(steps))
+        return batch, np.asarray(ever), np.asarray(flagged)
+
+    def _several_fn(self, carry, steps):
+        engine = self.core.engine
+        seconds = engine.substeps * engine.timestep
+
+        def step(_, carry):
+            batch, pusher, ever, _ = carry
+            world = batch.world
+            com, palm = world.view.object_com, world.view.agent.base_pos[:, 0]
+            pusher = push(self.reach, pusher, com, palm, world.key, world.step, seconds)
+            batch, _ = self.core.step_fn(batch, pusher.ctrl)
+            ever, flagged = ever | batch.world.physics.overflow, batch.flags != 0
+            return self.core.reset_fn(batch, flagged), pusher, ever, flagged
+
+        return jax.lax.fori_loop(0, steps, step, carry)
 
 
 @pytest.fixture(scope="module")
-def pushed(batch_of_many, reach):
+def pushing(batch_of_many, reach) -> Pushing:
+    return Pushing(batch_of_many, reach)
+
+
+@pytest.fixture(scope="module")
+def pushed(batch_of_many, pushing):
     """Eight seconds of pushing in every world."""
     before = batch_of_many.start(seed=7)
-    after, overflow = rollout(batch_of_many, reach, before, STEPS)
-    return before, after, overflow
+    return before, *pushing(before, STEPS)[:2]
 
 
 def test_measured_buffers_hold_while_hands_push_things_about(pushed, batch_of_many):
@@ -164,7 +124,9 @@ def test_measured_buffers_hold_while_hands_push_things_about(pushed, batch_of_ma
     }
 
 
-def test_world_0_is_the_same_among_few_and_among_many(scene, model, pool, profile, reach, batch_of_many, pushed):
+def test_world_0_is_the_same_among_few_and_among_many(
+    scene, model, pool, profile, reach, batch_of_many, pushing, pushed
+):
     """Streams and starts to the bit; the first second within what a GPU's order of sums does to it.
 
     Two runs on one device differ too, most after contacts: by 33 mm in the median after two seconds of pushing in
@@ -176,14 +138,14 @@ def test_world_0_is_the_same_among_few_and_among_many(scene, model, pool, profil
     start = few.start(seed=7)
     np.testing.assert_array_equal(start.world.key, np.asarray(pushed[0].world.key)[:8])
     np.testing.assert_array_equal(start.world.view.object_pos, np.asarray(pushed[0].world.view.object_pos)[:8])
-    some, _ = rollout(few, reach, start, 30)
-    many, _ = rollout(batch_of_many, reach, batch_of_many.start(seed=7), 30)
+    some, *_ = Pushing(few, reach)(start, 30)
+    many, *_ = pushing(batch_of_many.start(seed=7), 30)
     apart = np.abs(np.asarray(some.world.view.object_com) - np.asarray(many.world.view.object_com)[:8]).max((1, 2))
     np.testing.assert_array_equal(some.world.key, np.asarray(many.world.key)[:8])
     assert np.median(apart) < 5e-3, f"metres apart, by world: {apart}"
 
 
-def test_a_world_of_many_goes_on_natively(batch_of_many, pushed, scene):
+def test_a_world_of_many_goes_on_natively(batch_of_many, pushing, pushed, scene):
     """The same world, pulled to C MuJoCo: alike at once, after a step, and in what holds when still."""
     _, after, _ = pushed
     world = WORLDS - 3
@@ -197,13 +159,12 @@ def test_a_world_of_many_goes_on_natively(batch_of_many, pushed, scene):
     np.testing.assert_array_equal(simulation.view.touching[0], np.asarray(after.world.view.touching)[world])
     clock = np.asarray(batch_of_many.engine.time(after.world.physics))[world]
     assert simulation.time == pytest.approx(float(clock), abs=1e-5) and clock > STEPS / 30 - 1e-3
-    ctrl = jnp.asarray(after.world.physics.data.ctrl)
-    stepped, _ = jax.jit(batch_of_many.step_fn)(after, ctrl)  # `after` is used by other tests
-    view = simulation.step()
+    stepped, *_ = pushing(after, 1)
+    view = simulation.step(np.asarray(stepped.world.physics.data.ctrl)[world])
     np.testing.assert_allclose(view.object_pos[0], np.asarray(stepped.world.view.object_pos)[world], atol=1e-3)
 
 
-def test_resets_inside_a_program_put_flagged_worlds_right(batch_of_many, scene):
+def test_resets_inside_a_program_put_flagged_worlds_right(batch_of_many, pushing):
     """One world in eight has lost an object, half of them one that sleeps; each is flagged, counted, replaced."""
     batch = batch_of_many.start(seed=9)
     engine = batch_of_many.engine
@@ -217,12 +178,10 @@ def test_resets_inside_a_program_put_flagged_worlds_right(batch_of_many, scene):
     physics = jax.jit(engine.load)(batch.world.physics, rows)
     batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics))
 
-    def body(batch, _):
-        batch, _ = batch_of_many.step_fn(batch)
-        flagged = batch.flags != 0
-        return batch_of_many.reset_fn(batch, flagged), flagged
-
-    batch, flagged = jax.jit(lambda b: jax.lax.scan(body, b, None, 3))(batch)
+    flagged = []
+    for _ in range(3):
+        batch, _, of_step = pushing(batch, 1)
+        flagged.append(of_step)
     expected = np.zeros((3, WORLDS), bool)
     expected[0, ::8] = True
     np.testing.assert_array_equal(flagged, expected)

@@ -173,7 +173,8 @@ def load_meanwhile(
         by_size.setdefault(DEFAULT_BLOCK, []).append(wp.get_module(ffi.__name__))
         # Of what Warp itself compiles for: with PTX it may be an older one than the device's own (`Device.arch`).
         architecture = on.get_cuda_compile_arch()
-        first = None if architecture is None else tiles.builder(not_made(launches), architecture, workers)
+        missing = not_made(launches)
+        first = None if architecture is None else tiles.builder(missing, architecture, workers)
         done: concurrent.futures.Future[int] = concurrent.futures.Future()
         AWAITED.add(done)
         GC_PAUSED.begin()
@@ -184,7 +185,7 @@ def load_meanwhile(
 
     def load_all() -> None:
         try:
-            side_by_side(by_size, load_module, workers, first)
+            side_by_side(by_size, load_module, workers, first, in_turn=bool(missing))
         except BaseException as failure:
             done.set_exception(failure)
         else:
@@ -223,9 +224,11 @@ def side_by_side(
     act: Callable[[wp.Module, list[int]], None],
     workers: int | None,
     first: Callable[[], None] | None = None,
+    in_turn: bool = True,
 ) -> None:
     """Calls `act` for each module with its sizes of blocks, in so many threads (None: one for each processor).
 
+    `in_turn`: not while another program compiles kernels (`alone`).
     The longest come first: kernels of convex pairs, which take half a minute each. Modules with blocks of their own
     size (factorisations) come last, when `first` has ended, which is called alongside the others.
     """
@@ -236,7 +239,8 @@ def side_by_side(
     convex = [module for module in sizes if "_ccd_" in module.name]
     plain = [module for module in sizes if module not in convex and sizes[module] == [DEFAULT_BLOCK]]
     last = [module for module in sizes if module not in convex and module not in plain]
-    with alone(), WorkerThreads(workers or len(os.sched_getaffinity(0)), "ig2mj-kernels") as crew:
+    turn = alone() if in_turn else contextlib.nullcontext()
+    with turn, WorkerThreads(workers or len(os.sched_getaffinity(0)), "ig2mj-kernels") as crew:
         before = [crew.submit(first)] if first else []
         jobs = [crew.submit(act, module, sizes[module]) for module in convex + plain]
         concurrent.futures.wait(before)
