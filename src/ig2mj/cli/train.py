@@ -154,7 +154,8 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
         gpus = gpus if devices == "all" else gpus[: int(devices)]
         if len(gpus) > 1 and devices in ("all", str(len(gpus))):
             return run_on_each_gpu(gpus, [sys.executable, "-m", "ig2mj", *sys.argv[1:]], os.environ)
-    if devices != "1" or (topology and topology.count > 1):
+    of_homes = settings_of(algo, changes, quiet=True)[0].homes
+    if devices != "1" or (topology and topology.count > 1) or of_homes:  # an iteration is several programs
         keep_scratch_in_place()
     team = Team.join(topology)
     with team.together():
@@ -198,6 +199,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
         extra = {"paper_rl": settings.relaxed_thresholds, "expert": settings.expert}
         depends = {**depends_on(world, perception), **extra, "occlusion": dataclasses.asdict(occlusion)}
         keep: dict[str, Any] = {"save_buffer": settings.save_buffer, "programs": settings.programs}
+        keep |= {"homes_in_turn": settings.homes_in_turn}
         run = Run(chosen.minutes, None, seed, folder, resume, stop_at_success=chosen.stop_at_success, **keep)
         learner = None
         if shown is not None:

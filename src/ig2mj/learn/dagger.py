@@ -125,7 +125,7 @@ class DaggerState:
 class Dagger:
     """See the module's text. All methods are pure."""
 
-    name = "dagger"
+    name, replays = "dagger", True
 
     def __init__(
         self,
@@ -203,13 +203,14 @@ class Dagger:
         mean = jax.tree.map(lambda old, new: old + part * (new - old), before.actor, after.actor)
         return dataclasses.replace(after, actor=mean, last=after.actor)
 
-    def buffer(self, num_worlds: int) -> ImitationBuffer:
-        """No labels yet."""
+    def buffer(self, num_worlds: int, groups: int = 1) -> ImitationBuffer:
+        """No labels yet. `groups`: of worlds that are stepped in turn."""
         rows = max(self.config.buffer_size // (num_worlds * self.length), 1) * self.length
         unlabelled, sizes = jax.tree.map(jnp.asarray, self.unlabelled), (self._remembered, self.kept_predictions)
         shown = None if self.demos is None else (self.demos.seen, self.demos.label)
         shape = rows, num_worlds, self.perception, self.action_size
-        return ImitationBuffer.empty(*shape, unlabelled, *sizes, shown=jax.tree.map(jnp.array, shown))
+        shown = jax.tree.map(jnp.array, shown)
+        return ImitationBuffer.empty(*shape, unlabelled, *sizes, shown=shown, groups=groups)
 
     def cloned(self, learner: DaggerLearner, actor: Any, moments: RunningStats) -> DaggerLearner:
         """What begins with the actor of a clone, and the means that it was made with."""
@@ -283,14 +284,16 @@ class Dagger:
         key: Array,
         progress: Float[Array, ""],
         ready: Bool[Array, ""],
+        group: Int[Array, ""] | int = 0,
     ) -> tuple[DaggerLearner, ImitationBuffer, dict[str, Array]]:
         """Keeps a rollout's labels, and makes an iteration's updates.
 
         Args:
           progress: share of the run that is over. ready: without it nothing is updated: labels are gathered.
+          group: number of the worlds that the rollout is of.
         """
         c, extra = self.config, rollout.extra
-        buffer = buffer.insert(rollout.seen, extra["label"], extra.get(REMEMBERED), extra.get(PREDICTION))
+        buffer = buffer.insert(rollout.seen, extra["label"], extra.get(REMEMBERED), extra.get(PREDICTION), group)
         moments = learner.moments.update(rollout.seen.vector, self.axis)
         learner = dataclasses.replace(learner, moments=moments, progress=progress)
         rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, 1, c.final_lr / c.lr)(progress))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +17,7 @@ from jaxtyping import Float, Int, UInt8
 
 from ig2mj.engine.view import Array
 from ig2mj.learn.perception import Perception, Seen
-from ig2mj.learn.replay import write_ring
+from ig2mj.learn.replay import RingHeads
 
 ImagelessBatch = tuple[Float[Array, "B v"], Float[Array, "B n"], Float[Array, "B m"], Float[Array, "B g"]]
 """Steps without their images (`ImitationBuffer.sample_imageless`)."""
@@ -27,7 +28,7 @@ class ImitationBuffer:
     """The last T steps of W worlds.
 
     Attributes:
-      head: row that is written next. size: rows that are full.
+      head, size: `RingHeads`.
       remembered: what the actor remembered (`protocols.Memory`). prediction: what it predicted as it acted.
       unlabelled: samples that have no labels; None: there are none.
       shown: samples of demonstrations and their labels, which stay; None: there are none.
@@ -36,8 +37,8 @@ class ImitationBuffer:
     vector: Float[Array, "T W v"]
     image: UInt8[Array, "T W q"]
     label: Float[Array, "T W n"]
-    head: Int[Array, ""]
-    size: Int[Array, ""]
+    head: Int[Array, "*G"]
+    size: Int[Array, "*G"]
     remembered: Float[Array, "T W m"]
     prediction: Float[Array, "T W g"]
     unlabelled: Seen | None = None
@@ -54,18 +55,18 @@ class ImitationBuffer:
         remembered: int = 0,
         predictions: int = 0,
         shown: tuple[Seen, Float[Array, "D n"]] | None = None,
+        groups: int = 1,
     ) -> ImitationBuffer:
         """Room for so many steps of so many worlds.
 
         Args:
-          remembered: m. predictions: g; 0 where predictions are not kept.
+          remembered: m. predictions: g; 0 where predictions are not kept. groups: of worlds that are stepped in turn.
         """
         return cls(
             vector=jnp.zeros((steps, worlds, perception.vector_size)),
             image=jnp.zeros((steps, worlds, perception.image_bytes), jnp.uint8),
             label=jnp.zeros((steps, worlds, action_size)),
-            head=jnp.int32(0),
-            size=jnp.int32(0),
+            **RingHeads.empty(groups).fields,
             remembered=jnp.zeros((steps, worlds, remembered)),
             prediction=jnp.zeros((steps, worlds, predictions)),
             unlabelled=unlabelled,
@@ -75,15 +76,17 @@ class ImitationBuffer:
     def insert(
         self,
         seen: Seen,
-        label: Float[Array, "t W n"],
-        remembered: Float[Array, "t W m"] | None = None,
-        prediction: Float[Array, "t W g"] | None = None,
+        label: Float[Array, "t w n"],
+        remembered: Float[Array, "t w m"] | None = None,
+        prediction: Float[Array, "t w g"] | None = None,
+        group: Any = 0,
     ) -> ImitationBuffer:
-        """With more steps in place of the oldest; their number must divide T."""
+        """With more steps of a group of worlds in place of the oldest; their number must divide T."""
         count, capacity = label.shape[0], self.label.shape[0]
         assert capacity % count == 0, "steps are written without a seam"
 
-        put = functools.partial(write_ring, head=self.head)
+        heads = RingHeads(self.head, self.size)
+        put = functools.partial(heads.write, group=group)
         return dataclasses.replace(
             self,
             vector=put(self.vector, seen.vector),
@@ -91,8 +94,7 @@ class ImitationBuffer:
             label=put(self.label, label),
             remembered=self.remembered if remembered is None else put(self.remembered, remembered),
             prediction=self.prediction if prediction is None else put(self.prediction, prediction),
-            head=(self.head + count) % capacity,
-            size=jnp.minimum(self.size + count, capacity),
+            **heads.after(count, capacity, group).fields,
         )
 
     def sample(self, key: Array, count: int) -> tuple[Seen, Float[Array, "B n"], Float[Array, "B m"]]:
@@ -119,5 +121,6 @@ class ImitationBuffer:
 
     def _random(self, key: Array, count: int) -> tuple[Int[Array, "B"], Int[Array, "B"]]:
         row_key, world_key = jax.random.split(key)
-        row = jax.random.randint(row_key, (count,), 0, jnp.maximum(self.size, 1))
-        return row, jax.random.randint(world_key, (count,), 0, self.label.shape[1])
+        world = jax.random.randint(world_key, (count,), 0, self.label.shape[1])
+        _, size = RingHeads(self.head, self.size).of(world, self.label.shape[1])
+        return jax.random.randint(row_key, (count,), 0, jnp.maximum(size, 1)), world

@@ -9,8 +9,7 @@ Axes: W worlds, T steps.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Protocol, runtime_checkable
 
 import jax
@@ -21,8 +20,9 @@ from ig2mj.engine.view import Array
 from ig2mj.envs.experts import expert_of
 from ig2mj.learn.collect import NativeCollector, Play, TrainingEnv, begin, collect_fn, started
 from ig2mj.learn.perception import Perception
+from ig2mj.learn.progress import OF_HOMES
 from ig2mj.learn.protocols import as_adviser
-from ig2mj.process.gc_pause import Compiled, compile_together
+from ig2mj.process.gc_pause import Compiled, Traced, compile_together
 
 
 @runtime_checkable
@@ -155,22 +155,35 @@ class OneDevice:
 
 class SeveralHomes:
     """An iteration over several homes on one device: a program of its own steps the worlds of each home, with an expert
-    of its own, and one program learns from all rollouts."""
+    of its own, and one program learns.
 
-    def __init__(self, env: Any, algorithm: Algorithm):
-        """`env`: an `ig2mj.envs.several_homes.HomesEnvironment`."""
+    Where the algorithm replays and all homes have equally many worlds, homes take turns: an iteration steps the worlds
+    of one home. A home then has as many worlds for the same number of steps between updates as a training in one home
+    has, and a GPU, whose time for a step hardly depends on the number of worlds while they are few, is used as well.
+
+    Attributes:
+      turns: iterations until each home has had its turn; 1: each iteration steps all of them.
+    """
+
+    def __init__(self, env: Any, algorithm: Algorithm, in_turn: bool = True):
+        """`env`: an `ig2mj.envs.several_homes.HomesEnvironment`. `in_turn`: homes take turns where they can."""
         self._env, self._algorithm, self.num_worlds = env, algorithm, env.num_worlds
+        even = len({part.num_worlds for part in env.envs}) == 1
+        self.turns = len(env.envs) if in_turn and even and getattr(algorithm, "replays", False) else 1
+        self._next = 0
         helped = algorithm.adviser is not None
         self._advisers = [as_adviser(expert_of(part)) if helped else None for part in env.envs]
         self._play = [self._player(k) for k in range(len(env.envs))]
-        self._compiled: list[Callable[..., Any]] | None = None
 
-        def learn(learner: Any, buffer: Any, rollouts: list[Any], key: Array, progress: Array, ready: Array) -> Any:
+        def learn(
+            learner: Any, buffer: Any, rollouts: list[Any], home: Array, key: Array, progress: Array, ready: Array
+        ) -> Any:
             rollout = jax.tree.map(lambda *parts: jnp.concatenate(parts, axis=1), *rollouts)
-            learner, buffer, losses = algorithm.learn(learner, buffer, rollout, key, progress, ready)
+            turn: tuple[Any, ...] = (home,) if self.turns > 1 else ()
+            learner, buffer, losses = algorithm.learn(learner, buffer, rollout, key, progress, ready, *turn)
             return learner, buffer, {**losses, "all_finite": finite(learner)}
 
-        self._learn = jax.jit(learn, donate_argnums=(0, 1))
+        self._learn = Compiled(learn, donate_argnums=(0, 1))
 
     def _player(self, k: int) -> Any:
         part, algorithm, adviser = self._env.envs[k], self._algorithm, self._advisers[k]
@@ -180,17 +193,40 @@ class SeveralHomes:
         def collect(learner: Any, play: Play, key: Array) -> Any:
             return collect_fn(part, algorithm.perception, algorithm.act, adviser, learner, play, key, algorithm.length)
 
-        return jax.jit(collect, donate_argnums=1)
+        return Compiled(collect, donate_argnums=1)
 
     def buffer(self) -> Any:
         """The algorithm's buffer at the start of a run."""
-        return self._algorithm.buffer(self.num_worlds)
+        make: Any = self._algorithm.buffer
+        return make(self.num_worlds, self.turns) if self.turns > 1 else make(self.num_worlds)
 
     def begin(self, seed: int) -> list[Play]:
         """All worlds at the start of an episode, home by home."""
         state = self._algorithm.acting_state
         parts = enumerate(self._env.envs)
         return [begin(part, state(part.num_worlds), self._env.seed_of(k, seed)) for k, part in parts]
+
+    def compile_beforehand(self, learner: Any, buffer: Any, key: Array, seed: int) -> None:
+        """Compiles all programs of all homes side by side: their starts, what steps them, and what learns.
+
+        A home's programs are traced and lowered while those of the homes before it are compiled.
+        """
+        compile_together(self._programs(learner, buffer, key, seed))
+
+    def _programs(self, learner: Any, buffer: Any, key: Array, seed: int) -> Iterator[Traced]:
+        rollouts = list[Any]()
+        for k, part in enumerate(self._env.envs):
+            pending = part.pending_programs(self._env.seed_of(k, seed))
+            if not pending:  # the engine runs what is compiled when it is called
+                return
+            play = started(pending[0].returned, self._algorithm.acting_state(part.num_worlds), part.num_worlds)
+            collect = self._play[k].traced(learner, play, key)
+            yield collect
+            yield from pending
+            rollouts.append(collect.returned[1])
+            if len(rollouts) == len(self._env.envs) or (self.turns > 1 and k == 0):
+                seen = rollouts[:1] if self.turns > 1 else rollouts
+                yield self._learn.traced(learner, buffer, seen, np.int32(0), key, jnp.float32(0.0), jnp.bool_(False))
 
     def place(self, learner: Any, buffer: Any) -> tuple[Any, Any]:
         """Learner and buffer as arrays on the device."""
@@ -199,26 +235,31 @@ class SeveralHomes:
     def __call__(
         self, learner: Any, buffer: Any, plays: list[Play], key: Array, progress: float, ready: bool, clock: float = 0.0
     ) -> tuple[Any, Any, list[Play], dict[str, float], dict[str, float], float]:
-        """As `OneDevice.__call__`."""
+        """As `OneDevice.__call__`. The sums also have success and number of episodes of each home."""
         play_key, learn_key = jax.random.split(key)
-        keys = jax.random.split(play_key, len(plays))
-        if self._env.pure and self._compiled is None:
-            lowered = [play.lower(learner, part, one) for play, part, one in zip(self._play, plays, keys, strict=True)]
-            with ThreadPoolExecutor(len(lowered), "ig2mj-homes") as threads:
-                self._compiled = list(threads.map(lambda program: program.compile(), lowered))
-        began = time.perf_counter()
-        if self._compiled is not None:
-            done = [act(learner, part, one) for act, part, one in zip(self._compiled, plays, keys, strict=True)]
-        else:
-            length = self._algorithm.length
-            done = [act(learner, part, one, length)[:3] for act, part, one in zip(self._play, plays, keys, strict=True)]
-        plays, rollouts, sums = ([one[k] for one in done] for k in range(3))
+        keys, first = jax.random.split(play_key, len(plays)), self._next
+        chosen = range(len(plays)) if self.turns == 1 else range(first, first + 1)
+        self._next = (first + 1) % self.turns
+        began, plays, rollouts, sums = time.perf_counter(), list(plays), list[Any](), dict[int, dict[str, Any]]()
+        length = () if self._env.pure else (self._algorithm.length,)
+        for k in chosen:
+            plays[k], rollout, sums[k], *_ = self._play[k](learner, plays[k], keys[k], *length)
+            rollouts.append(rollout)
         jax.block_until_ready(sums)
         spent = time.perf_counter() - began
         share, go = jnp.float32(progress), jnp.bool_(ready)
-        learner, buffer, losses = self._learn(learner, buffer, rollouts, learn_key, share, go)
-        total = {name: sum(float(np.asarray(one[name])) for one in sums) for name in sums[0]}
-        return learner, buffer, plays, total, {**floats(jax.device_get(losses)), "clock": clock}, spent
+        learner, buffer, losses = self._learn(learner, buffer, rollouts, np.int32(first), learn_key, share, go)
+        counted = {k: floats(jax.device_get(found)) for k, found in sums.items()}
+        return learner, buffer, plays, self._total(counted), {**floats(jax.device_get(losses)), "clock": clock}, spent
+
+    def _total(self, counted: Mapping[int, Mapping[str, float]]) -> dict[str, float]:
+        """Sums over homes, and those of single homes. `counted`: by number of the home."""
+        total = {name: sum(one[name] for one in counted.values()) for name in next(iter(counted.values()))}
+        for k, home in enumerate(self._env.homes):
+            for name in OF_HOMES:
+                own = counted[k][name] if k in counted else 0.0
+                total[f"{name}/{home}"] = total.get(f"{name}/{home}", 0.0) + own
+        return total
 
 
 def finite(tree: Any) -> Array:

@@ -93,7 +93,7 @@ class Minibatch:
 class PPO:
     """See the module's text. All methods are pure."""
 
-    name, adviser = "ppo", None
+    name, adviser, replays = "ppo", None, False
 
     def __init__(
         self, perception: Perception, action_size: int, config: PPOConfig | None = None, axis: str | None = None

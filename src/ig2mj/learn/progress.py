@@ -10,6 +10,9 @@ from typing import Any
 EPISODES = (100, 500)
 """Return and success are of so many of the last episodes: of as many as there are worlds, within these limits."""
 
+OF_HOMES = ("episodes", "success")
+"""Sums of which trainings in several homes also have one of each home, as `success/birch`."""
+
 
 @dataclasses.dataclass
 class Window:
@@ -46,9 +49,12 @@ class Window:
         """Of the last episodes by name; per step, what is counted per step."""
         total = {name: sum(s[name] for s in self.last) for name in self.last[-1]}
         episodes, steps = total.pop("episodes"), total.pop("steps")
+        of_homes = {name.partition("/")[2]: total.pop(name) for name in list(total) if name.startswith("episodes/")}
         found: dict[str, float | None] = {}
         for name, value in total.items():
-            count = steps if name.startswith("reward") else episodes if steps >= self.least else 0
+            kind, _, home = name.partition("/")
+            ended = of_homes[home] if kind == "success" and home else episodes
+            count = steps if name.startswith("reward") else ended if steps >= self.least else 0
             found[name] = value / count if count else None
         return found
 

@@ -77,6 +77,8 @@ class RunSettings:
       horizon: agent steps of an episode; 0: those of the demonstrations, else the task's.
       relaxed_thresholds: the success thresholds of the paper's experiments.
       homes: "train", or names of homes with commas: worlds are shared out over them; "": the task's own.
+      homes_in_turn: an iteration steps the worlds of one of several homes, in turn (sac and dagger, where worlds divide
+        evenly over homes); false: of all of them.
       randomize: axes of `ig2mj.Randomize` with commas, or "all"; "": nothing differs between episodes.
       expert: for SAC: the task's scripted expert begins episodes and labels states.
       save_buffer: checkpoints hold the replay buffer; without it a resumed run first refills it.
@@ -94,6 +96,7 @@ class RunSettings:
     horizon: int = 0
     relaxed_thresholds: bool = False
     homes: str = ""
+    homes_in_turn: bool = True
     randomize: str = ""
     expert: bool = False
     save_buffer: bool = False

@@ -91,15 +91,23 @@ class RewardScale:
         return cls(jnp.zeros(num_worlds), jnp.float32(0), jnp.float32(0), jnp.float32(0))
 
     def update(
-        self, reward: Float[Array, "T W"], done: Bool[Array, "T W"], gamma: float, axis: str | None = None
+        self,
+        reward: Float[Array, "T w"],
+        done: Bool[Array, "T w"],
+        gamma: float,
+        axis: str | None = None,
+        group: Any = 0,
     ) -> RewardScale:
-        """After more steps."""
+        """After more steps, of all worlds or of that group of equally many neighbours."""
 
         def step(running: Array, now: tuple[Array, Array]) -> tuple[Array, Array]:
             running = running * gamma + now[0]
             return jnp.where(now[1], 0.0, running), running
 
-        running, returns = jax.lax.scan(step, self.running, (reward, done))
+        count = reward.shape[1]
+        before = jax.lax.dynamic_slice_in_dim(self.running, group * count, count)
+        after, returns = jax.lax.scan(step, before, (reward, done))
+        running = jax.lax.dynamic_update_slice_in_dim(self.running, after, group * count, 0)
         sizes = jnp.sort(jnp.abs(returns).max(0))
         square, largest = average(jnp.square(returns).mean(), axis), sizes[-1 - len(sizes) // RARE]
         if axis is not None:

@@ -146,7 +146,7 @@ class Noise:
 class SAC:
     """See the module's text. All methods are pure."""
 
-    name = "sac"
+    name, replays = "sac", True
 
     def __init__(
         self,
@@ -215,13 +215,13 @@ class SAC:
             progress=jnp.float32(0),
         )
 
-    def buffer(self, num_worlds: int) -> SACBuffers:
-        """An empty replay buffer."""
+    def buffer(self, num_worlds: int, groups: int = 1) -> SACBuffers:
+        """An empty replay buffer. `groups`: of worlds that are stepped in turn."""
         c = self.config
         rows = max(c.buffer_size // (num_worlds * c.rollout_length), 1) * c.rollout_length
         rows = max(rows, -(-(c.n_step + 1) // c.rollout_length) * c.rollout_length)
         labels = self.action_size if self.adviser is not None else 0
-        replay = Replay.empty(rows, num_worlds, self.perception, self.action_size, labels)
+        replay = Replay.empty(rows, num_worlds, self.perception, self.action_size, labels, groups)
         demos = Replay.of_demos(self._demos, labelled=labels > 0) if self._demos is not None else None
         return SACBuffers(replay, RewardScale.initial(num_worlds), demos)
 
@@ -283,15 +283,17 @@ class SAC:
         key: Array,
         progress: Float[Array, ""],
         ready: Bool[Array, ""],
+        group: Int[Array, ""] | int = 0,
     ) -> tuple[SACLearner, SACBuffers, dict[str, Array]]:
         """Stores a rollout, and makes an iteration's updates.
 
         Args:
           progress: share of the run that is over. ready: without it nothing is updated: the buffer fills.
+          group: number of the worlds that the rollout is of.
         """
         c = self.config
-        scale = buffers.scale.update(rollout.reward, rollout.done, c.gamma, self.axis)
-        buffers = SACBuffers(buffers.replay.insert(rollout), scale, buffers.demos)
+        scale = buffers.scale.update(rollout.reward, rollout.done, c.gamma, self.axis, group)
+        buffers = SACBuffers(buffers.replay.insert(rollout, group), scale, buffers.demos)
         moments = learner.moments.update(rollout.seen.vector, self.axis)
         learner = dataclasses.replace(learner, moments=moments, progress=progress)
         rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, 1, c.final_lr / c.lr)(progress))

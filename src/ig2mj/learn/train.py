@@ -46,6 +46,7 @@ class Run:
       resume: go on from the newest checkpoint in `out`. save_buffer: checkpoints hold the replay buffer, too.
       checkpoint_every, log_every: seconds. stop_at_success: stop once so large a share of the last episodes succeeds.
       programs: 1 or 2: of an iteration on a pure engine.
+      homes_in_turn: of several homes an iteration steps one (`ig2mj.learn.iteration.SeveralHomes`).
       quiet: nothing on the terminal.
     """
 
@@ -59,6 +60,7 @@ class Run:
     log_every: float = 5.0
     stop_at_success: float | None = None
     programs: int = 1
+    homes_in_turn: bool = True
     quiet: bool = False
 
 
@@ -129,7 +131,7 @@ class _Training:
         if several and devices:
             raise Ig2mjError("several homes are for one device (--devices 1)")
         self.step: Any = (
-            SeveralHomes(env, algorithm)
+            SeveralHomes(env, algorithm, run.homes_in_turn)
             if several
             else ManyDevices(env, algorithm, devices, team)
             if devices
@@ -140,7 +142,7 @@ class _Training:
         self.log = Log(run.out if team.first else None, quiet=run.quiet or not team.first, minutes=run.minutes)
         self.clock, self.iteration, self.env_steps = 0.0, 0, 0
         resumed = self._resume() if run.resume else self._begin()
-        self.waiting = 2 if resumed and run.save_buffer else algorithm.warm_up(resumed)
+        self.waiting = 2 if resumed and run.save_buffer else algorithm.warm_up(resumed) * getattr(self.step, "turns", 1)
         """Of the iterations of this process the first that learns."""
         self.horizon = float(horizon_of(env))
 
@@ -184,7 +186,7 @@ class _Training:
         run, team, worlds = self.run, self.team, self.step.num_worlds
         self.learner, self.buffer = self.step.place(same(self.learner, team), self.buffer)
         beforehand = time.monotonic()
-        if isinstance(self.step, OneDevice):
+        if isinstance(self.step, OneDevice | SeveralHomes):
             self.step.compile_beforehand(self.learner, self.buffer, self.key, run.seed + self.iteration)
         beforehand = time.monotonic() - beforehand
         with team.turns():

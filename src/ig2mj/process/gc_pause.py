@@ -13,7 +13,7 @@ import concurrent.futures
 import contextlib
 import gc
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from ig2mj.process.worker_threads import spawn
@@ -125,10 +125,11 @@ class Traced:
         return done
 
 
-def compile_together(programs: Sequence[Traced]) -> None:
+def compile_together(programs: Iterable[Traced]) -> None:
     """Compiles programs, or reads them from the cache, without running them.
 
-    Lowering holds Python's lock and is sequential; compilation runs in parallel to it. List the longest program first.
+    Lowering holds Python's lock and is sequential; compilation runs in parallel to it, and so does tracing where
+    `programs` traces each program when it is asked for it. List the longest program first.
     """
     for compiling in [program.compiling() for program in programs]:
         compiling.result()

@@ -177,11 +177,31 @@ def axes_of(quarter: int) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"
     return np.array([x, y, 0.0]), np.array([-y, x, 0.0])
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Asked:
+    """A task and a folder, as a key: a training in several homes asks twice for each. Tasks have no hash; this very
+    object counts."""
+
+    task: Task
+    folder: pathlib.Path
+
+    def __hash__(self) -> int:
+        return hash((id(self.task), self.folder))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Asked) and self.task is other.task and self.folder == other.folder
+
+
+@functools.lru_cache(maxsize=32)
+def _known_difference(asked: _Asked) -> str:
+    return _difference(asked.task, asked.folder)
+
+
 def relocated(task: Task, home: str | os.PathLike) -> Task:
     """The task in another home. Raises EngineError: it does not fit; says why. InputError: there is no such home."""
     folder = scene_folder(home)
     if scene_folder(task.home) != folder:
-        reason = _difference(task, folder)
+        reason = _known_difference(_Asked(task, folder))
         if reason and task.fit is not None:
             return _moved(task, home_name(home), _spot(task.name, task.fit, _own(task), str(folder)))
         if reason:

@@ -20,8 +20,9 @@ from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.patches.table import runs
 
 GRAPHS = 128
-"""CUDA graphs of a call that are kept. Warp keeps 32. An environment that is stepped from Python may alternate between
-more, as JAX gives it other buffers, and would capture one in every step."""
+"""CUDA graphs of a call that are kept for each scene and number of worlds. Warp keeps 32. An environment that is
+stepped from Python may alternate between more, as JAX gives it other buffers, and would capture one in every step. All
+scenes share the call, and where homes take turns, a limit for all together would drop the graphs of those that wait."""
 
 _callables = ScopedReplacement()
 
@@ -33,12 +34,15 @@ class Filled:
         """`call`: what `wp.jax_callable` gives; it reads its `array_input_indices` only to find graphs."""
         self._call, self._indices = call, tuple(call.array_input_indices)
         self._seen, self._lock = set[int](), threading.Lock()
+        self._kinds = set[tuple[tuple[int, ...], ...]]()
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Traces a call. An array that has elements in any call traced so far counts in all of them."""
         with self._lock:
             self._seen.update(k for k in self._indices if args[k].size)
             self._call.array_input_indices = [k for k in self._indices if k in self._seen]
+            self._kinds.add(tuple(args[k].shape for k in self._indices))
+            self._call.graph_cache_max = GRAPHS * len(self._kinds)
         return self._call(*args, **kwargs)
 
 
