@@ -104,3 +104,12 @@ def test_renamed_subcommands_exist():
         module = importlib.import_module(f"ig2mj.cli.{name.replace('-', '_')}")
         for old, new in getattr(module, "RENAMED", {}).items():
             assert old not in module.SUBCOMMANDS and new in module.SUBCOMMANDS
+
+
+def test_settings_that_are_given_one_by_one_all_count(probe, capsys):
+    def run(set: tuple[str, ...] = (), seed: int = 0) -> None:
+        print(set, seed)
+
+    probe.run = run
+    assert cli.call(["probe", "--set", "a=1", "b=2", "--seed", "3", "--set", "c=4"]) == 0
+    assert capsys.readouterr().out == "('a=1', 'b=2', 'c=4') 3\n"

@@ -237,7 +237,8 @@ class SeveralHomes:
     ) -> tuple[Any, Any, list[Play], dict[str, float], dict[str, float], float]:
         """As `OneDevice.__call__`. The sums also have success and number of episodes of each home."""
         play_key, learn_key = jax.random.split(key)
-        keys, first = jax.random.split(play_key, len(plays)), self._next
+        keys = [play_key] if len(plays) == 1 else jax.random.split(play_key, len(plays))
+        first = self._next
         chosen = range(len(plays)) if self.turns == 1 else range(first, first + 1)
         self._next = (first + 1) % self.turns
         began, plays, rollouts, sums = time.perf_counter(), list(plays), list[Any](), dict[int, dict[str, Any]]()
