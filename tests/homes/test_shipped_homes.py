@@ -9,6 +9,7 @@ import time
 import mujoco
 import numpy as np
 import pytest
+from ig2mj_converters.bodies.inertia import DEFAULT_DENSITY
 from ig2mj_homes.dataset.ship import SHARED, total_bytes, used_assets
 from ig2mj_homes.dataset.shipped_homes import home_names
 from ig2mj_homes.objects.opening_strength import open_joint
@@ -49,6 +50,14 @@ def test_the_small_home_and_the_sixteen_are_there():
 
 def test_the_whole_folder_stays_small():
     assert total_bytes(SHIPPED_HOMES) < 26.5e6
+
+
+def test_every_model_of_the_library_was_converted_with_the_density_of_its_category():
+    """Not with that of a category which a dataset does not describe."""
+    manifests = [json.loads(file.read_text()) for file in SHIPPED_HOMES.glob("objects/*/*/manifest.json")]
+    densities = {o["name"]: o["mass"] / np.prod(o["bounding_box"]) for m in manifests for o in m["objects"][:1]}
+    assert len(densities) > 600
+    assert not [name for name, density in densities.items() if abs(density - DEFAULT_DENSITY) < 0.05]
 
 
 def test_meshes_and_textures_are_stored_once_and_all_are_used():
