@@ -51,6 +51,10 @@ CLOSING, GRIPPING = 0.006, 0.02
 """m in an agent step by which a closing hand goes on, and a gripper on an arm: a floating hand's targets behind a
 surface add up, and small things that are pressed on their support are shot out."""
 
+NEAR, COMING, TOUCHING = 0.025, 0.03, 0.01
+"""m before an object from which on a floating hand comes slowly to it, m in an agent step until then, and from there:
+what is thin would be between its fingers and the back of the hand before they close, or shot out below it."""
+
 POSES, WAYS = 6, 120
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
 
@@ -118,13 +122,15 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     if way is None:
         return "no_path", f"the hand has no path to {name}"
     lift = LIFT * UP * float(pose.palm @ UP > -0.9)
-    deep = vector3(pose.at(-BELOW))
+    deep, floats = vector3(pose.at(-BELOW)), world.body.opening is None
+    near = Phase(hand=hand, pos=vector3(pose.at(NEAR)), quat=quat, tolerance=0.01, limit=12, after="", speed=COMING)
     reason = yield [
         *travel(hand, way, quat),
+        *([near] if floats else []),
         Phase(hand=hand, pos=deep, quat=quat, until=Until.TOUCHED, object=index, close=False, limit=25, after="",
-              speed=0.03),
+              speed=TOUCHING if floats else COMING),
         Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15, after="no_grasp",
-              speed=CLOSING if world.body.opening is None else GRIPPING),
+              speed=CLOSING if floats else GRIPPING),
         *([Phase(hand=hand, pos=vector3(pose.at(0.0) + lift), keeps=index, close=True, tolerance=0.02, limit=10,
                  after="", speed=0.03)] if lift.any() else []),
         Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=True, tolerance=0.04, limit=30, after="",

@@ -135,6 +135,7 @@ def _grips(joint: OpenableJoint) -> tuple[tuple[FaceGrip, ...], tuple[FaceGrip, 
     vertices = joint.vertices
     middle = vertices.mean(0)
     if not joint.hinge:
+        middle = (vertices.min(0) + vertices.max(0)) / 2  # most corners of a drawer are those of its bottom
         normal = sign * joint.axis
         across = [v for v in np.eye(3) if abs(v @ normal) < 0.7]
         face = middle + (((vertices - middle) @ normal).max()) * normal

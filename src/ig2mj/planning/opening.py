@@ -29,7 +29,7 @@ from ig2mj.planning.moves import (
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
-from ig2mj.planning.stances import stances
+from ig2mj.planning.stances import reaching_all, stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import PlannedWorld, Stance, Vector
 
@@ -51,6 +51,9 @@ SHUT, MOVED = 0.01, 0.05
 LAST = 0.1
 """Share of a joint's range to which a hand on the edge of a door pulls it shut; it is pushed from there."""
 
+FINGERS = 0.12
+"""m of a drawer above a hand that takes hold of it, from which on its fingers may point up."""
+
 UPRIGHT = 0.5
 """Horizontal part of the normal of a face from which on the robot stands in front of it: not of a lid's."""
 
@@ -59,6 +62,10 @@ WIDE, TRIES = 0.5, 2
 
 HANDS = 2
 """Hands with which each joint is tried where there is no floor to move it from."""
+
+EMPTY, FULL = (0.04, 0.05), (0.004, 0.015)
+"""m in an agent step of a hand that pulls, and m within which it has reached a place on the way: of what is empty, and
+of a drawer with things in it. A hand moves in jerks, one in each agent step, under which things slide to the back."""
 
 STANCES, WAYS = 20, 12
 """Stances for each grip, and ways of a hand that are looked for with one kind of grip, at most."""
@@ -139,7 +146,8 @@ def _move_one(
     joint, opens = (shut[0], True) if shut else (out[0], False)
     key = joint.name if opens else f"{joint.name} shut"
     yield from move_joint(world, joint, free_hand(world, tried[key]), opens, tried[key])
-    tried[key] += 1
+    now = {j.name: j.fraction for j in joints_of(world, joint.object)}
+    tried[key] += abs(now[joint.name] - joint.fraction) < MOVED  # else the same way again, from where it is now
     return True
 
 
@@ -227,15 +235,16 @@ def _plan(
             for stance in stances(world, hand, middle, floor, AWAY, most=STANCES, before=face):
                 if np.linalg.norm(sweep - np.array(stance.xy), axis=1).min() < STAND_OFF:
                     continue
-                if not all(world.reaches(hand, stance, p) for p, _ in places):
+                stance = reaching_all(world, hand, stance, np.array([p for p, _ in places]), obstacles)
+                if stance is None:
                     continue
                 count += 1
                 if count > WAYS:
                     break
-                spheres = world.spheres(_fingers(normal, pulls, hand), -normal)
+                spheres = world.spheres(_fingers(joint, places[0], pulls, hand), -normal)
                 before = first + ABOVE * normal
                 back = [-ahead(stance.yaw), normal, UP]
-                quat = world.body.turned(hand, _fingers(normal, pulls, hand), -normal)
+                quat = world.body.turned(hand, _fingers(joint, places[0], pulls, hand), -normal)
                 follows = world.follows(hand, quat, obstacles, stance)
                 if hand_path(obstacles, spheres, world.resting(hand, stance), before, back, follows=follows) is None:
                     continue
@@ -246,9 +255,16 @@ def _plan(
     return None
 
 
-def _fingers(normal: Vector, pulls: bool, hand: int) -> Vector:
-    """Fingers that pull lie upwards; those that push along the face, so that they do not enter the gap above a
-    drawer."""
+def _is_full(world: PlannedWorld, joint: OpenableJoint) -> bool:
+    """Whether something loose lies in a drawer."""
+    return not joint.hinge and any(joint.surrounds(world.com(n)) for n in world.domain.loose if n not in world.held)
+
+
+def _fingers(joint: OpenableJoint, grip: FaceGrip, pulls: bool, hand: int) -> Vector:
+    """Fingers that pull lie upwards, where the link is that high: else they take hold of the drawer above. Those that
+    push lie along the face, so that they do not enter the gap above a drawer."""
+    point, normal = grip
+    pulls = pulls and (joint.hinge or float(joint.vertices[:, 2].max() - point[2]) > FINGERS)
     across = UP - (UP @ normal) * normal
     across = across / np.linalg.norm(across) if np.linalg.norm(across) > 0.3 else np.array([1.0, 0.0, 0.0])
     if pulls:
@@ -260,7 +276,7 @@ def _fingers(normal: Vector, pulls: bool, hand: int) -> Vector:
 def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointPlan) -> Program | None:
     places, index = plan.places, joint.object_index
     first, normal = places[0]
-    fingers = _fingers(normal, plan.pulls, hand)
+    fingers = _fingers(joint, places[0], plan.pulls, hand)
     quat = world.body.turned(hand, fingers, -normal)
     _, yaw = world.base
     before, back = first + ABOVE * normal, [-ahead(yaw), normal, UP]
@@ -278,13 +294,15 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
         last = vector3(places[-1][0] - 2 * PRESS * places[-1][1])
         program.append(Phase(hand=hand, pos=last, until=Until.WAITED, limit=6))
     else:
+        speed, tolerance = FULL if _is_full(world, joint) else EMPTY
+        limit = 20 + int(np.linalg.norm(places[1][0] - first) / speed)
         program += [
             Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), quat=quat, until=Until.TOUCHED, object=index,
                   close=False, limit=20, after="", speed=0.03),
             Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), until=Until.HELD, object=index, close=True,
                   limit=15, after="no_grasp", speed=0.02),
-            *[Phase(hand=hand, pos=vector3(p), close=True, tolerance=0.05, limit=20, after="", keeps=index, speed=0.04)
-              for p, _ in places[1:]],
+            *[Phase(hand=hand, pos=vector3(p), close=True, tolerance=tolerance, limit=limit, after="", keeps=index,
+                    speed=speed) for p, _ in places[1:]],
             Phase(hand=hand, close=False, until=Until.EMPTY, limit=10, after=""),
         ]  # fmt: skip
     program.append(Phase(hand=hand, pos=vector3(places[-1][0] + RETREAT * places[-1][1]), limit=12, after=""))

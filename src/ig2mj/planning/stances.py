@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -78,6 +79,24 @@ def stances(
         count += 1
         if count == most:
             return
+
+
+def reaching_all(
+    world: PlannedWorld, hand: int, stance: Stance, points: Float[np.ndarray, "n 3"], obstacles: Obstacles
+) -> Stance | None:
+    """The same place, with the body stretched or stooped as little as it takes that a hand reaches all of some points;
+    None: there it does not, or has no room above it."""
+    shoulder = world.shoulder(hand, dataclasses.replace(stance, rise=0.0))
+    away, above = np.linalg.norm(points[:, :2] - shoulder[:2], axis=1), points[:, 2] - shoulder[2]
+    if away.max() >= world.body.reach:
+        return None
+    span = np.sqrt(world.body.reach**2 - away**2)
+    low = max(float((above - span).max()), world.body.rises[0])
+    high = min(float((above + span).min()), world.body.rises[1])
+    rise = float(np.clip(0.0, low, high))
+    if low > high or not _stretches(world, obstacles, np.array(stance.xy), rise):
+        return None
+    return dataclasses.replace(stance, rise=rise)
 
 
 def behind_wall(world: PlannedWorld, obstacles: Obstacles, xy: Float[np.ndarray, "2"], point: Vector) -> bool:

@@ -300,7 +300,11 @@ class PlannedWorld:
 
     def reaches(self, hand: int, stance: Stance, point: Vector) -> bool:
         """Whether a hand reaches a point from a stance."""
-        return bool(np.linalg.norm(point - self._from(self.body.shoulders[hand], stance)) <= self.body.reach)
+        return bool(np.linalg.norm(point - self.shoulder(hand, stance)) <= self.body.reach)
+
+    def shoulder(self, hand: int, stance: Stance) -> Vector:
+        """The middle of the sphere that bounds a hand's reach, if the robot stood there; world frame."""
+        return self._from(self.body.shoulders[hand], stance)
 
     def turned_hand(self, hand: int, rotation: Rotation) -> tuple[float, float, float, float]:
         """Orientation of a hand, w-x-y-z, after a rotation."""
