@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Generator, Iterator, Sequence
 
 import numpy as np
 
 from ig2mj.planning.cleaning_area import leaves_free
-from ig2mj.planning.clearance import straight
+from ig2mj.planning.clearance import Obstacles, straight
 from ig2mj.planning.driving import go
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.grasps import GraspPose, grasp_poses, ordered
 from ig2mj.planning.moves import (
     ATTEMPTS,
     BELOW,
+    CLOSING,
+    COMING,
+    GRIPPING,
+    NEAR,
+    RETREAT,
+    TOUCHING,
     UP,
     Primitive,
     Program,
@@ -31,7 +38,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase, Until
-from ig2mj.planning.stances import stances
+from ig2mj.planning.stances import reaching_all, stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
 
@@ -46,14 +53,6 @@ CLEARLY = 0.05
 
 MOVED = 0.03
 """m that an object has moved beyond which its grasp is planned again."""
-
-CLOSING, GRIPPING = 0.006, 0.02
-"""m in an agent step by which a closing hand goes on, and a gripper on an arm: a floating hand's targets behind a
-surface add up, and small things that are pressed on their support are shot out."""
-
-NEAR, COMING, TOUCHING = 0.025, 0.03, 0.01
-"""m before an object from which on a floating hand comes slowly to it, m in an agent step until then, and from there:
-what is thin would be between its fingers and the back of the hand before they close, or shot out below it."""
 
 POSES, WAYS = 6, 120
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
@@ -173,10 +172,11 @@ def _plan(
     def candidates() -> Iterator[tuple[Stance, GraspPose]]:
         for point in (world.com(name), *points[_spread(points, world.com(name))], _nearest(world, floor, points)):
             for stance in stances(world, hand, point, floor, AWAY):
-                near = [p for p in ordered(poses, stance.yaw, on_arm) if world.reaches(hand, stance, p.at(p.before))]
+                best = ordered(poses, stance.yaw, on_arm)
                 if prefers is not None:
-                    near.sort(key=_less_wanted(prefers))
-                yield from ((stance, pose) for pose in near[:POSES])
+                    best.sort(key=_less_wanted(prefers))
+                near = ((_reaching(world, hand, stance, pose, obstacles), pose) for pose in best)
+                yield from itertools.islice(((at, pose) for at, pose in near if at is not None), POSES)
 
     def has_way(candidate: tuple[Stance, GraspPose], search: bool) -> bool:
         stance, pose = candidate
@@ -186,6 +186,13 @@ def _plan(
         return hand_path(obstacles, spheres, rests, goal, back, search=search, follows=follows) is not None
 
     return first_way(candidates(), has_way, WAYS)
+
+
+def _reaching(world: PlannedWorld, hand: int, stance: Stance, pose: GraspPose, obstacles: Obstacles) -> Stance | None:
+    """A stance with the body as high as it takes for a pose; None: the hand does not reach it from there."""
+    if world.reaches(hand, stance, pose.at(pose.before)):
+        return stance
+    return reaching_all(world, hand, stance, np.array([pose.at(pose.before), pose.at(0.0)]), obstacles)
 
 
 def _less_wanted(prefers: Prefers) -> Callable[[GraspPose], int]:
@@ -221,8 +228,15 @@ def release(world: PlannedWorld, step: Step) -> Primitive:
     """Lowers what the hand holds as far as there is room, and opens the hand."""
     name = step.object
     hand = hand_with(world, name)
-    empty = [Phase(hand=hand, close=False, until=Until.EMPTY, limit=15), *rest(hand)]
-    reason = yield [*(_lowered(world, name, hand) if not world.domain.fixed(name) else []), *empty]
+    lowered = _lowered(world, name, hand) if not world.domain.fixed(name) else []
+    at = world.grip(hand) if not lowered or lowered[-1].pos is None else np.array(lowered[-1].pos)
+    off = vector3(at - RETREAT * world.hand_axes(hand)[1])
+    reason = yield [
+        *lowered,
+        Phase(hand=hand, close=False, until=Until.EMPTY, limit=15),
+        Phase(hand=hand, pos=off, tolerance=0.04, limit=15, after=""),
+        *rest(hand),
+    ]
     return Outcome() if name not in world.held else Outcome(reason or "not_true_after", "the hand did not open")
 
 

@@ -30,6 +30,14 @@ ATTEMPTS = 4
 ABOVE, BELOW = 0.12, 0.03
 """m: above a grasp at which a hand comes to it, and below an object's top that it goes for, until it touches."""
 
+CLOSING, GRIPPING = 0.006, 0.02
+"""m in an agent step by which a closing hand goes on, and a gripper on an arm: a floating hand's targets behind a
+surface add up, and small things that are pressed on their support are shot out."""
+
+NEAR, COMING, TOUCHING = 0.025, 0.03, 0.01
+"""m before an object from which on a floating hand comes slowly to it, m in an agent step until then, and from there:
+what is thin would be between its fingers and the back of the hand before they close, or shot out below it."""
+
 LET_GO = 0.015
 """m above its place at which an object is let go."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import functools
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 
 import numpy as np
 
@@ -16,7 +16,12 @@ from ig2mj.planning.joints import AJAR, OPEN_TO, FaceGrip, OpenableJoint, openab
 from ig2mj.planning.moves import (
     ABOVE,
     ATTEMPTS,
+    CLOSING,
+    COMING,
+    GRIPPING,
+    NEAR,
     RETREAT,
+    TOUCHING,
     UP,
     Primitive,
     Program,
@@ -60,6 +65,9 @@ UPRIGHT = 0.5
 WIDE, TRIES = 0.5, 2
 """Share of a joint's range from which on it is not in the way of a hand, and times that it is moved out of the way."""
 
+LIFTED, HOOKED = 0.2, 12
+"""Share of its range from which on a lid's inner face is pushed; agent steps in which fingers get below its edge."""
+
 HANDS = 2
 """Hands with which each joint is tried where there is no floor to move it from."""
 
@@ -90,7 +98,7 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             if nowhere == HANDS * len(joints):
                 break
             now = {j.name: j.fraction for j in joints_of(world, name)}
-            passed[joint.name] = tried + (abs(now[joint.name] - joint.fraction) < MOVED)
+            passed[joint.name] = tried + (_progress(joint, now, value) < MOVED)
         if world.facts.holds("open", name) == value:
             return Outcome(attempts=2 * ATTEMPTS)
         return Outcome(reason or "not_true_after", detail, attempts=2 * ATTEMPTS)
@@ -147,8 +155,13 @@ def _move_one(
     key = joint.name if opens else f"{joint.name} shut"
     yield from move_joint(world, joint, free_hand(world, tried[key]), opens, tried[key])
     now = {j.name: j.fraction for j in joints_of(world, joint.object)}
-    tried[key] += abs(now[joint.name] - joint.fraction) < MOVED  # else the same way again, from where it is now
+    tried[key] += _progress(joint, now, opens) < MOVED  # else the same way again, from where it is now
     return True
+
+
+def _progress(joint: OpenableJoint, now: Mapping[str, float], value: bool) -> float:
+    """By which share of its range a joint has moved the way it was to, given the shares to which all are open now."""
+    return (now[joint.name] - joint.fraction) * (1.0 if value else -1.0)
 
 
 def move_joint(
@@ -200,13 +213,18 @@ class _JointPlan:
 
 
 def _ways(
-    joint: OpenableJoint, value: bool, to: float = OPEN_TO, between_rooms: bool = False
+    world: PlannedWorld, joint: OpenableJoint, value: bool, to: float = OPEN_TO
 ) -> list[tuple[tuple[FaceGrip, ...], float, bool]]:
     """Grips, share of the joint's range to which they move it, and whether the hand pulls: a door is pulled open by its
     outer face or its edge, and pushed shut by its outer face. Where no floor is free before that, it is pulled by its
-    edge until it is nearly shut, or by its inner face until it is ajar; a door between rooms, until it is shut."""
-    if value:
+    edge until it is nearly shut, or by its inner face until it is ajar; a door between rooms, until it is shut. A lid
+    or flap, which hands do not take hold of, is lifted by fingers below its edge, and pushed where it is ajar."""
+    between_rooms = world.domain.model.tables.object_categories[joint.object_index] == "door"
+    if value and _is_held(world, joint):
         return [(joint.grips, to, True), (joint.edges, to, True), (joint.inner_grips, to, False)]
+    if value:
+        ways = [(joint.grips, to, True), (joint.edges, to, True), (joint.inner_grips, to, False)]
+        return ways if joint.fraction < LIFTED else ways[::-1]
     ways = [(joint.grips, 0.0, False)]
     if not joint.hinge:
         ways.append((joint.edges, 0.0, True))
@@ -219,13 +237,17 @@ def _ways(
     return [*ways, (joint.grips, 0.0, True)]
 
 
+def _is_held(world: PlannedWorld, joint: OpenableJoint) -> bool:
+    """Whether hands take hold of a link: of what is fixed (`ig2mj.scene.build_tables`)."""
+    return world.domain.fixed(joint.object)
+
+
 def _plan(
     world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int, to: float = OPEN_TO
 ) -> _JointPlan | None:
     floor, obstacles = world.floor(), world.obstacles()
     passed = 0
-    between_rooms = world.domain.model.tables.object_categories[joint.object_index] == "door"
-    for grips, fraction, pulls in _ways(joint, value, to, between_rooms):
+    for grips, fraction, pulls in _ways(world, joint, value, to):
         count, sweep = 0, joint.sweep(fraction)[:, :2]
         for grip in grips:
             places = joint.path(grip, fraction)
@@ -293,14 +315,26 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
         ]
         last = vector3(places[-1][0] - 2 * PRESS * places[-1][1])
         program.append(Phase(hand=hand, pos=last, until=Until.WAITED, limit=6))
+    elif not _is_held(world, joint):
+        program += [
+            Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), quat=quat, close=True, until=Until.WAITED,
+                  limit=HOOKED, speed=COMING),
+            *[Phase(hand=hand, pos=vector3(p), tolerance=0.05, limit=20, after="", speed=0.03) for p, _ in places[1:]],
+            Phase(hand=hand, close=False, until=Until.WAITED, limit=3),
+        ]  # fmt: skip
     else:
+        floats = world.body.opening is None
         speed, tolerance = FULL if _is_full(world, joint) else EMPTY
+        near = Phase(
+            hand=hand, pos=vector3(first + NEAR * normal), quat=quat, tolerance=0.01, limit=12, after="", speed=COMING
+        )
         limit = 20 + int(np.linalg.norm(places[1][0] - first) / speed)
         program += [
+            *([near] if floats else []),
             Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), quat=quat, until=Until.TOUCHED, object=index,
-                  close=False, limit=20, after="", speed=0.03),
+                  close=False, limit=25, after="", speed=TOUCHING if floats else COMING),
             Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), until=Until.HELD, object=index, close=True,
-                  limit=15, after="no_grasp", speed=0.02),
+                  limit=15, after="no_grasp", speed=CLOSING if floats else GRIPPING),
             *[Phase(hand=hand, pos=vector3(p), close=True, tolerance=tolerance, limit=limit, after="", keeps=index,
                     speed=speed) for p, _ in places[1:]],
             Phase(hand=hand, close=False, until=Until.EMPTY, limit=10, after=""),

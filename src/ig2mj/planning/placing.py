@@ -105,7 +105,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                       limit=20, after="", speed=0.03),
                 Phase(hand=hand, close=False, until=Until.EMPTY, limit=10),
                 Phase(hand=hand, pos=vector3(target - RETREAT * palm), tolerance=0.04, limit=15, after=""),
-                *travel(hand, way[-2::-1], None),
+                *travel(hand, [*way[-2::-1], start], None),
                 *rest(hand),
                 Phase(until=Until.WAITED, limit=6 if spot.drop == 0.0 else FALLING),
             ]  # fmt: skip
