@@ -11,6 +11,7 @@ from collections.abc import Generator
 
 import numpy as np
 
+from ig2mj.planning.carrying import carried_way
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.moves import UP, Program, go_home, strayed, vector3
 from ig2mj.planning.occupancy import RESOLUTION
@@ -93,6 +94,8 @@ def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     start = _backed(world, Stance((float(here[0]), float(here[1])), yaw), standing, turning)
     end = _backed(world, stance, standing, turning)
     way = None if start is None or end is None else turning.way(start.xy, end.xy)
+    if way is None and world.body.sideways and (carried := _carried(world, standing, stance)):
+        return (yield [*_keeping(world, carried), *last])
     if way is None:  # what is held may touch something where the way turns
         way = world.floor(holding=True, ahead=True).way(here, stance.xy)
         way = standing.way(here, stance.xy) if way is None else way
@@ -101,6 +104,21 @@ def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     program = [] if start.xy == (here[0], here[1]) else [shift(start)]
     program += drive(way, stance.yaw)
     return (yield [*_keeping(world, [*program, *([] if end.xy == stance.xy else [shift(stance)])]), *last])
+
+
+def _carried(world: PlannedWorld, standing: FreeFloor, stance: Stance) -> Program:
+    """The program of a base that goes sideways and backwards where there is no room to turn with what is held; empty:
+    there is no such way."""
+    points = standing.way(world.base[0], stance.xy)
+    stances = None if points is None else carried_way(world, points, stance.yaw)
+    if stances is None:
+        return []
+    program, before = [], world.base[0]
+    for there in stances:
+        limit = AT_LEAST + int(np.linalg.norm(np.subtract(there.xy, before)) / SLOWEST)
+        program.append(dataclasses.replace(shift(there), tolerance=0.05, turn_tolerance=0.12, limit=limit))
+        before = there.xy
+    return [*program, shift(stance)]
 
 
 def _keeping(world: PlannedWorld, program: Program) -> Program:

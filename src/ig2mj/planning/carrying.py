@@ -1,0 +1,104 @@
+"""Ways of a base that moves in any direction, along which what its hands hold meets nothing.
+
+A way over the floor is gone along with headings that change on it: where there is no room to turn, the robot goes
+sideways or backwards, and turns where there is. Searched are places of the way times `HEADINGS`.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.geometry.host_rotations import about_vertical
+from ig2mj.planning.world import PlannedWorld, Stance
+
+HEADINGS, APART = 16, 0.1
+"""Directions that the robot may face on the way, and m between the places of the way at which it may turn, at most."""
+
+TURN = 0.15
+"""m of way that a turn by one heading counts as."""
+
+
+def carried_way(world: PlannedWorld, points: Float[np.ndarray, "N 2"], yaw: float) -> list[Stance] | None:
+    """Stances one after another, between which the base shifts, or turns where it is; None: there is no such way.
+
+    Args:
+      points: of a way over the floor; the first is where the robot is. yaw: rad, at its end.
+    """
+    places = _sampled(points)
+    (here, now), last = world.base, len(places) - 1
+    held = _held(world)
+    obstacles = world.obstacles([n for n in world.held if n and not world.domain.fixed(n)])
+    step = 2 * np.pi / HEADINGS
+    goal = last, round((yaw - now) / step) % HEADINGS
+    known: dict[tuple[int, int], bool] = {(0, 0): True}
+
+    def clear(state: tuple[int, int]) -> bool:
+        if state not in known:
+            at, heading = state
+            there = held[:, :3] @ about_vertical(now + step * heading).T + np.array([*places[at], 0.0])
+            known[state] = obstacles.clear(np.concatenate([there, held[:, 3:]], axis=1))
+        return known[state]
+
+    costs, before = {(0, 0): 0.0}, dict[tuple[int, int], tuple[int, int]]()
+    queue = [(0.0, (0, 0))]
+    while queue:
+        cost, state = heapq.heappop(queue)
+        if state == goal:
+            break
+        if cost > costs[state]:
+            continue
+        at, heading = state
+        turns = [((at, (heading + side) % HEADINGS), TURN) for side in (1, -1)]
+        moves = [((at + side, heading), APART) for side in (1, -1) if 0 <= at + side <= last]
+        for other, extra in (*moves, *turns):
+            if cost + extra < costs.get(other, np.inf) and clear(other):
+                costs[other], before[other] = cost + extra, state
+                heapq.heappush(queue, (cost + extra, other))
+    if goal not in costs:
+        return None
+    states = [goal]
+    while states[-1] in before:
+        states.append(before[states[-1]])
+    found = [Stance((float(places[at][0]), float(places[at][1])), now + step * heading) for at, heading in states[::-1]]
+    return _merged([*found[1:], Stance(found[-1].xy, yaw)], Stance((float(here[0]), float(here[1])), now))
+
+
+def _held(world: PlannedWorld) -> Float[np.ndarray, "n 4"]:
+    """Spheres of hands with what they hold, about the base, as if it faced along x."""
+    here, now = world.base
+    found = [np.zeros((0, 4))]
+    for hand, name in enumerate(world.held):
+        if name and not world.domain.fixed(name):
+            spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
+            about = (spheres[:, :3] + world.grip(hand) - np.array([*here, 0.0])) @ about_vertical(now)
+            found.append(np.concatenate([about, spheres[:, 3:]], axis=1))
+    return np.concatenate(found)
+
+
+def _sampled(points: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "M 2"]:
+    """Points of a way with those between them."""
+    found = [points[:1]]
+    for a, b in itertools.pairwise(points):
+        count = max(1, int(np.ceil(np.linalg.norm(b - a) / APART)))
+        found.append(a + np.linspace(0, 1, count + 1)[1:, None] * (b - a))
+    return np.concatenate(found)
+
+
+def _merged(stances: list[Stance], before: Stance) -> list[Stance]:
+    """Without those between which the robot goes straight on, or turns on."""
+    kept: list[Stance] = []
+    for stance in stances:
+        if kept:
+            last = kept[-2] if len(kept) > 1 else before
+            one, two = np.subtract(kept[-1].xy, last.xy), np.subtract(stance.xy, kept[-1].xy)
+            far = float(np.linalg.norm(one)), float(np.linalg.norm(two))
+            turned, turns = kept[-1].yaw - last.yaw, stance.yaw - kept[-1].yaw
+            ahead = min(far) > 1e-6 and float(one @ two) > 0.9999 * far[0] * far[1] and abs(turned) + abs(turns) < 1e-6
+            if ahead:
+                kept.pop()
+        kept.append(stance)
+    return kept
