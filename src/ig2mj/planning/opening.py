@@ -324,7 +324,7 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
         ]  # fmt: skip
     else:
         floats = world.body.opening is None
-        speed, tolerance = FULL if _is_full(world, joint) else EMPTY
+        speed, tolerance = FULL if floats and _is_full(world, joint) else EMPTY
         near = Phase(
             hand=hand, pos=vector3(first + NEAR * normal), quat=quat, tolerance=0.01, limit=12, after="", speed=COMING
         )
