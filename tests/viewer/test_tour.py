@@ -9,6 +9,7 @@ from ig2mj.errors import Ig2mjError, UnknownNameError
 from ig2mj.scene.scene import load_scene
 from ig2mj.viewer.captions import caption
 from ig2mj.viewer.room_views import EYE_HEIGHT, room_view, standing_places
+from ig2mj.viewer.sight_lines import SightLines
 from ig2mj.viewer.tour import _eye, open_doors, path, tour
 
 
@@ -26,6 +27,19 @@ def test_the_walk_sees_every_room_from_eye_height(home):
             tilt = np.radians(shot.view.elevation)
             assert shot.view.lookat[2] - shot.view.distance * np.sin(tilt) == pytest.approx(EYE_HEIGHT)
             assert home.rooms.room_at(_eye(shot.view)) is not None
+
+
+def test_walls_do_not_fill_images(home):
+    data = home.start_data()
+    open_doors(home, data)
+    lines, field, full = SightLines(home.model), np.radians(np.linspace(-45, 45, 13)), []
+    for shot in list(tour(home, data, rate=2)):
+        if shot.words != home.name:
+            turn = np.radians(shot.view.azimuth) + field
+            rays = np.stack([np.cos(turn), np.sin(turn), np.full(13, -0.25)], axis=1)
+            rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+            full.append(np.median(lines.cast(data, [*_eye(shot.view), EYE_HEIGHT], rays)[1]) < 1.0)
+    assert len(full) > 10 and np.mean(full) < 0.03
 
 
 def test_ways_stay_on_the_free_floor(home):

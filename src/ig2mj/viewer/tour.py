@@ -1,4 +1,8 @@
-"""A walk through a home: the home from above, then room after room from eye height, through open doors."""
+"""A walk through a home: the home from above, then room after room from eye height, through open doors.
+
+The camera walks over the free floor and looks along its way, or over the room in which it stands, unless a wall or
+furniture would fill the image (`gaze`).
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import collections
 import dataclasses
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -17,9 +21,11 @@ from ig2mj.errors import Ig2mjError
 from ig2mj.looks import visual_of
 from ig2mj.scene.scene import Scene
 from ig2mj.viewer.captions import caption
+from ig2mj.viewer.gaze import plan_gaze
 from ig2mj.viewer.offscreen import FreeView, render
 from ig2mj.viewer.overview import home_overview
 from ig2mj.viewer.room_views import EYE_HEIGHT, TILT, room_view
+from ig2mj.viewer.sight_lines import SightLines
 from ig2mj.viewer.video import FRAME_RATE, VIDEO_SIZE, VideoWriter
 
 ABOVE, ABOVE_TURN, ABOVE_TILT = 2.5, 30.0, -52.0
@@ -28,11 +34,17 @@ ABOVE, ABOVE_TURN, ABOVE_TILT = 2.5, 30.0, -52.0
 PAN, TURN_RATE = 75.0, 28.0
 """Degrees of each room that are seen by turning, and degrees in a second."""
 
-SPEED, FIELD_OF_VIEW = 1.1, 68.0
-"""m/s of walking; degrees, vertical."""
+SPEED, START, FIELD_OF_VIEW = 1.1, 0.8, 68.0
+"""m/s of walking; s that starting and stopping take more; degrees, vertical."""
 
-AHEAD = 0.9
+AHEAD = 1.2
 """m along the way to what a walker looks at."""
+
+STATIONS = 6
+"""Stations in a second for which a direction of view is chosen."""
+
+WEIGHT_WAY, WEIGHT_ROOM = 2.0, 5.0
+"""Cost in each second of looking 90 degrees off the way, and off what shows a room (see `gaze`)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,47 +103,83 @@ def tour(scene: Scene, data: mujoco.MjData, rate: float | int = FRAME_RATE) -> I
     for k in range(count):
         turn = 90.0 + ABOVE_TURN * (k / count - 0.5)
         yield Shot(home_overview(scene, data, azimuth=turn, elevation=ABOVE_TILT), scene.name)
-    views = [(name, room_view(scene, name, FIELD_OF_VIEW)) for name in _order(scene)]
-    for number, (name, view) in enumerate(views):
-        words, eye = _title(name), _eye(view)
-        steps = round(PAN / TURN_RATE * rate)
-        for k in range(steps):
-            turn = view.azimuth + PAN * (_eased(k / steps) - 0.5)
-            yield Shot(_looking(eye, turn), words)
-        if number + 1 < len(views):
-            last = view.azimuth + PAN / 2
-            yield from _walk(scene, eye, last, views[number + 1], rate)
+    lines = SightLines(scene.model)
+    for stations in _walks(scene):
+        yield from _looking_around(lines, data, stations, rate)
 
 
-def _walk(
-    scene: Scene, start: Float[np.ndarray, "2"], turn: float, target: tuple[str, FreeView], rate: float | int
-) -> Iterator[Shot]:
-    """From one place to where the next room is seen from; nothing where no way leads there."""
-    name, view = target
-    way = path(scene, start, _eye(view))
-    if way is None:
-        return
-    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
-    total = float(lengths[-1])
-    steps = max(2, round(total / SPEED * rate))
-    first = view.azimuth - PAN / 2
+@dataclasses.dataclass(frozen=True)
+class _Station:
+    """A place (x, y, m) of the camera, which way it would look (azimuth, degrees), how much that matters, and the
+    room's name."""
+
+    eye: Float[np.ndarray, "2"]
+    wish: float
+    weight: float
+    words: str
+
+
+def _walks(scene: Scene) -> Iterator[list[_Station]]:
+    """Stations of the camera, `STATIONS` in a second: a walk, and another one from each room to which no way leads."""
+    stations: list[_Station] = []
     rooms = scene.rooms
     assert rooms is not None
-    for k in range(steps):
-        at = total * k / steps
-        here = np.array([np.interp(at, lengths, way[:, axis]) for axis in (0, 1)])
-        far = min(at + AHEAD, total)
-        there = np.array([np.interp(far, lengths, way[:, axis]) for axis in (0, 1)])
+    for name in _order(scene):
+        view = room_view(scene, name, FIELD_OF_VIEW)
+        eye, words = _eye(view), _title(name)
+        way = path(scene, stations[-1].eye, eye) if stations else None
+        if way is not None:
+            stations += _walk(way, lambda at, words=words: _title(room) if (room := rooms.room_at(at)) else words)
+        elif stations:
+            yield stations
+            stations = []
+        count = round(PAN / TURN_RATE * STATIONS)
+        for k in range(count):
+            stations.append(_Station(eye, view.azimuth + PAN * (_eased(k / count) - 0.5), WEIGHT_ROOM, words))
+    yield stations
+
+
+def _walk(way: Float[np.ndarray, "n 2"], words: Callable[[np.ndarray], str]) -> list[_Station]:
+    """Stations along a way (m), slow at both ends."""
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
+    total = float(lengths[-1])
+    count = max(2, round((total / SPEED + START) * STATIONS))
+    walked = []
+    for k in range(count):
+        at = total * _started(k / count, START * STATIONS / count)
+        here, there = (_along(way, lengths, s) for s in (at, min(at + AHEAD, total)))
         if total - at < AHEAD:
-            wished = first
-        else:
-            wished = math.degrees(math.atan2(there[1] - here[1], there[0] - here[0]))
-        change = (wished - turn + 180.0) % 360.0 - 180.0
-        turn += float(np.clip(0.12 * change, -110.0 / rate, 110.0 / rate))
-        yield Shot(_looking(here, turn), _title(rooms.room_at(here) or name))
-    while abs(change := (first - turn + 180.0) % 360.0 - 180.0) > 1.0:
-        turn += float(np.clip(0.2 * change, -90.0 / rate, 90.0 / rate)) + math.copysign(0.2, change)
-        yield Shot(_looking(_eye(view), turn), _title(name))
+            there = here + way[-1] - _along(way, lengths, total - AHEAD)
+        wish = math.degrees(math.atan2(there[1] - here[1], there[0] - here[0]))
+        walked.append(_Station(here, wish, WEIGHT_WAY, words(here)))
+    return walked
+
+
+def _along(way: Float[np.ndarray, "n 2"], lengths: Float[np.ndarray, "n"], at: float) -> Float[np.ndarray, "2"]:
+    """The point (m) of a way at a length (m) from its start."""
+    return np.array([np.interp(at, lengths, way[:, axis]) for axis in (0, 1)])
+
+
+def _looking_around(
+    lines: SightLines, data: mujoco.MjData, stations: Sequence[_Station], rate: float | int
+) -> Iterator[Shot]:
+    """The shots of a walk, `rate` in a second."""
+    eyes = np.array([station.eye for station in stations])
+    wide = 2 * math.degrees(math.atan(math.tan(math.radians(FIELD_OF_VIEW / 2)) * VIDEO_SIZE[0] / VIDEO_SIZE[1]))
+    turns = plan_gaze(
+        lines,
+        data,
+        np.concatenate([eyes, np.full((len(eyes), 1), EYE_HEIGHT)], axis=1),
+        np.array([station.wish for station in stations]),
+        np.array([station.weight for station in stations]),
+        rate=STATIONS,
+        field=wide,
+    )
+    times = np.arange(len(stations)) / STATIONS
+    for time in np.arange(0.0, len(stations) / STATIONS, 1.0 / rate):
+        eye = np.array([np.interp(time, times, eyes[:, axis]) for axis in (0, 1)])
+        number = min(int(time * STATIONS), len(stations) - 1)
+        yield Shot(_looking(eye, float(np.interp(time, times, turns))), stations[number].words)
 
 
 def path(scene: Scene, start: Float[np.ndarray, "2"], end: Float[np.ndarray, "2"]) -> Float[np.ndarray, "n 2"] | None:
@@ -234,6 +282,13 @@ def _looking(eye: np.ndarray, turn: float) -> FreeView:
     ahead = np.array([math.cos(tilt) * math.cos(way), math.cos(tilt) * math.sin(way), math.sin(tilt)])
     at = np.array([*eye, EYE_HEIGHT]) + ahead
     return FreeView(tuple(at.tolist()), 1.0, turn, TILT, fovy=FIELD_OF_VIEW)
+
+
+def _started(share: float, part: float) -> float:
+    """0..1: speed grows over the first `part` / 2 of the time and falls over the last."""
+    part, near = min(part / 2, 0.5), min(share, 1 - share)
+    gone = near * near / (2 * part) if near < part else near - part / 2
+    return (gone if share < 0.5 else 1 - part - gone) / (1 - part)
 
 
 def _eased(share: float) -> float:
