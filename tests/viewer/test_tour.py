@@ -38,7 +38,7 @@ def test_walls_do_not_fill_images(home):
             turn = np.radians(shot.view.azimuth) + field
             rays = np.stack([np.cos(turn), np.sin(turn), np.full(13, -0.25)], axis=1)
             rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-            full.append(np.median(lines.cast(data, [*_eye(shot.view), EYE_HEIGHT], rays)[1]) < 1.0)
+            full.append(np.median(lines.cast(data, np.array([*_eye(shot.view), EYE_HEIGHT]), rays)[1]) < 1.0)
     assert len(full) > 10 and np.mean(full) < 0.03
 
 

@@ -15,7 +15,7 @@ from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.tables import SceneTables
 from ig2mj.viewer.offscreen import FreeView
 
-DISTANCES, ELEVATIONS, SIDES = (2.5, 1.8), (-30.0, -48.0, -66.0), 16
+DISTANCES, ELEVATIONS, SIDES = (2.5, 1.8, 1.2), (-30.0, -48.0, -66.0), 16
 """m from what is looked at, degrees below the horizon, and number of directions around it that are tried."""
 
 TALL = (0.35, 0.6)
@@ -70,18 +70,27 @@ class FollowCamera:
                 middle = (1 - SHARE) * middle + SHARE * place if number == objects[0] else middle
         targets += [data.xpos[b] for b, a in zip(tables.hand_body, tables.hand_agent, strict=True) if a == self._agent]
         focus, self._count = (objects[0] if objects else -1), self._count + 1
+        own = self._own(model, objects)
+        at = self._followed(middle)
+        moved = self._view if self._view is None else dataclasses.replace(self._view, lookat=_floats(at))
         if (
-            self._view is None
+            moved is None
             or focus != self._focus
             or self._count % AGAIN == 0
-            or _seen(model, data, self._view, targets, self._own(model, objects)) < 2.0 * len(targets)
+            or _seen(model, data, moved, targets, own) < 2.0 * len(targets)
         ):
-            self._view, self._focus = self._best(model, data, middle, targets, objects), focus
+            moved, self._focus = self._best(model, data, at, targets, own, moved), focus
+            if _seen(model, data, moved, targets[: len(TALL)], own) < 2.0 * len(TALL):
+                moved = self._best(model, data, middle, targets, own, None)
+        self._view = moved
+        return moved
+
+    def _followed(self, middle: Vector) -> Vector:
+        """What the next image looks at: it follows `middle` by steps, and jumps where that is far away."""
+        if self._view is None:
+            return middle
         before = np.array(self._view.lookat)
-        x, y, z = before + SMOOTH * (middle - before) if np.linalg.norm(before - middle) < 1.0 else middle
-        at = (float(x), float(y), float(z))
-        self._view = FreeView(at, self._view.distance, self._view.azimuth, self._view.elevation)
-        return self._view
+        return before + SMOOTH * (middle - before) if np.linalg.norm(before - middle) < 1.0 else middle
 
     def _own(self, model: mujoco.MjModel, objects: Sequence[int]) -> np.ndarray:
         """Bodies of the robot, of what it wears, and of the objects."""
@@ -92,28 +101,32 @@ class FollowCamera:
         return own
 
     def _best(
-        self, model: mujoco.MjModel, data: mujoco.MjData, middle: Vector, targets: list[Vector], objects: Sequence[int]
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        at: Vector,
+        targets: list[Vector],
+        own: np.ndarray,
+        present: FreeView | None,
     ) -> FreeView:
-        """The place from which most targets are seen; the present one unless another is clearly better."""
-        tables = self._tables
-        turn = data.xmat[tables.agent_body[self._agent]].reshape(3, 3)
+        """The camera that looks at `at` and sees most targets; `present` unless another is clearly better."""
+        turn = data.xmat[self._tables.agent_body[self._agent]].reshape(3, 3)
         yaw = math.degrees(math.atan2(turn[1, 0], turn[0, 0]))
-        own = self._own(model, objects)
-        x, y, z = (float(v) for v in middle)
 
         def value(view: FreeView) -> float:
             side = abs((view.azimuth - yaw + 180.0) % 360.0 - 180.0)  # 0: behind the robot's back
             worse = abs(side - PREFERRED) / 90.0 + 0.03 * abs(view.elevation - ELEVATIONS[0])
-            return _seen(model, data, view, targets, own) - worse - (view.distance < DISTANCES[0])
+            return _seen(model, data, view, targets, own) - worse - DISTANCES.index(view.distance)
 
         angles = [360.0 * k / SIDES for k in range(SIDES)]
         places = [(d, a, e) for d in DISTANCES for e in ELEVATIONS for a in angles]
-        best = max((FreeView((x, y, z), *place) for place in places), key=value)
-        if self._view is None:
-            return best
-        old = FreeView((x, y, z), self._view.distance, self._view.azimuth, self._view.elevation)
-        better = value(best) > value(old) + STAY
-        return dataclasses.replace(best if better else old, lookat=self._view.lookat)
+        best = max((FreeView(_floats(at), *place) for place in places), key=value)
+        return best if present is None or value(best) > value(present) + STAY else present
+
+
+def _floats(point: Vector) -> tuple[float, float, float]:
+    x, y, z = (float(c) for c in point)
+    return x, y, z
 
 
 def _seen(model: mujoco.MjModel, data: mujoco.MjData, view: FreeView, targets: list[Vector], own: np.ndarray) -> float:
