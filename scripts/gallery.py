@@ -56,8 +56,8 @@ def rooms() -> None:
         scene = load_scene(home)
         tiles.append(tile(scene, room_view(scene, name), f"{kind.replace('_', ' ')} ({home})"))
     sheet(tiles, 4).save(FOLDER / "gallery_rooms.jpg", quality=QUALITY)
-    scene = load_scene("birch")
-    tile(scene, room_view(scene, "living_room_0"), "", (960, 540)).save(FOLDER / "room.jpg", quality=QUALITY)
+    scene = load_scene("rowan")
+    tile(scene, room_view(scene, "living_room_0", 58.0), "", (960, 540)).save(FOLDER / "room.jpg", quality=QUALITY)
 
 
 def homes() -> None:

@@ -31,7 +31,7 @@ SHARE = 0.35
 """Of the way from the robot to the object at which the middle of an image is."""
 
 AGAIN, STAY = 10, 1.0
-"""Images after which another place is looked for, and how much better it must be."""
+"""Images after which another place is looked for while body and objects are seen, and how much better it must be."""
 
 SMOOTH = 0.2
 """Share by which the point that is looked at follows in each image."""
@@ -39,7 +39,12 @@ SMOOTH = 0.2
 PREFERRED = 55.0
 """Degrees to the side of the robot's back from which a view is best: hands are seen."""
 
+CROWDED, AROUND = 1.0, tuple((x, y) for x in (-0.6, -0.3, 0.3, 0.6) for y in (-0.3, 0.3))
+"""m from the camera within which things fill the image; where it is tested (right and up, for one ahead)."""
+
 Vector = Float[np.ndarray, "3"]
+
+_GROUPS = np.isin(np.arange(mujoco.mjNGROUP), VISIBLE_GROUPS).astype(np.uint8)
 
 
 class FollowCamera:
@@ -68,6 +73,7 @@ class FollowCamera:
             if np.linalg.norm((place - base)[:2]) < NEAR:
                 targets.append(place)
                 middle = (1 - SHARE) * middle + SHARE * place if number == objects[0] else middle
+        seen = list(targets)
         targets += [data.xpos[b] for b, a in zip(tables.hand_body, tables.hand_agent, strict=True) if a == self._agent]
         focus, self._count = (objects[0] if objects else -1), self._count + 1
         own = self._own(model, objects)
@@ -77,7 +83,7 @@ class FollowCamera:
             moved is None
             or focus != self._focus
             or self._count % AGAIN == 0
-            or _seen(model, data, moved, targets, own) < 2.0 * len(targets)
+            or _seen(model, data, moved, seen, own) < 2.0 * len(seen)
         ):
             moved, self._focus = self._best(model, data, at, targets, own, moved), focus
             if _seen(model, data, moved, targets[: len(TALL)], own) < 2.0 * len(TALL):
@@ -116,7 +122,8 @@ class FollowCamera:
         def value(view: FreeView) -> float:
             side = abs((view.azimuth - yaw + 180.0) % 360.0 - 180.0)  # 0: behind the robot's back
             worse = abs(side - PREFERRED) / 90.0 + 0.03 * abs(view.elevation - ELEVATIONS[0])
-            return _seen(model, data, view, targets, own) - worse - DISTANCES.index(view.distance)
+            worse += DISTANCES.index(view.distance) + 3.0 * _crowded(model, data, view)
+            return _seen(model, data, view, targets, own) - worse
 
         angles = [360.0 * k / SIDES for k in range(SIDES)]
         places = [(d, a, e) for d in DISTANCES for e in ELEVATIONS for a in angles]
@@ -131,15 +138,37 @@ def _floats(point: Vector) -> tuple[float, float, float]:
 
 def _seen(model: mujoco.MjModel, data: mujoco.MjData, view: FreeView, targets: list[Vector], own: np.ndarray) -> float:
     """Number of targets that are seen, twice. `own`: bodies that hide nothing."""
-    azimuth, elevation = math.radians(view.azimuth), math.radians(view.elevation)
-    level = math.cos(elevation)
-    ahead = np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
-    eye = np.asarray(view.lookat) - view.distance * ahead
-    group = np.isin(np.arange(mujoco.mjNGROUP), VISIBLE_GROUPS).astype(np.uint8)
-    hit, seen = np.array([-1], np.int32), 0.0
+    eye, _ = _eye(view)
+    seen = 0.0
     for target in targets:
         way = target - eye
         length = float(np.linalg.norm(way))
-        distance = mujoco.mj_ray(model, data, eye, way / length, group, 1, -1, hit)
-        seen += 2.0 * (distance < 0 or distance > length - SLACK or bool(own[model.geom_bodyid[hit[0]]]))
+        distance, geom = _ray(model, data, eye, way / length)
+        seen += 2.0 * (distance > length - SLACK or bool(own[model.geom_bodyid[geom]]))
     return seen
+
+
+def _crowded(model: mujoco.MjModel, data: mujoco.MjData, view: FreeView) -> float:
+    """Share of the image's corners and sides that something fills from less than `CROWDED` m."""
+    eye, axes = _eye(view)
+    near = 0
+    for across, up in AROUND:
+        way = axes[0] + across * axes[1] + up * axes[2]
+        near += _ray(model, data, eye, way / np.linalg.norm(way))[0] < CROWDED
+    return near / len(AROUND)
+
+
+def _eye(view: FreeView) -> tuple[Vector, Float[np.ndarray, "3 3"]]:
+    """Position of the camera, m, and its axes in rows: ahead, to the right, up."""
+    azimuth, elevation = math.radians(view.azimuth), math.radians(view.elevation)
+    level = math.cos(elevation)
+    ahead = np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
+    right = np.array([math.sin(azimuth), -math.cos(azimuth), 0.0])
+    return np.asarray(view.lookat) - view.distance * ahead, np.stack([ahead, right, np.cross(right, ahead)])
+
+
+def _ray(model: mujoco.MjModel, data: mujoco.MjData, eye: Vector, way: Vector) -> tuple[float, int]:
+    """How far the nearest visible geom is in a direction, m (infinite: none), and its number."""
+    hit = np.array([-1], np.int32)
+    distance = mujoco.mj_ray(model, data, eye, way, _GROUPS, 1, -1, hit)
+    return (distance, int(hit[0])) if distance >= 0 else (math.inf, 0)

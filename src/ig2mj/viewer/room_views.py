@@ -10,7 +10,10 @@ from jaxtyping import Float
 
 from ig2mj.errors import UnknownNameError
 from ig2mj.scene.scene import Scene
+from ig2mj.viewer.gaze import DIRECTIONS as NEARNESS_DIRECTIONS
+from ig2mj.viewer.gaze import nearness
 from ig2mj.viewer.offscreen import FreeView
+from ig2mj.viewer.sight_lines import SightLines
 
 EYE_HEIGHT, FIELD_OF_VIEW, TILT = 1.55, 70.0, -13.0
 """m above the floor; degrees, vertical; degrees below the horizon."""
@@ -24,34 +27,50 @@ FROM_DOORS = 0.75
 DIRECTIONS = 24
 """Directions of view that are tried, around the circle."""
 
+PER_METRE = 8.0
+"""Points on the floor that a metre of a piece of furniture (its diagonal, 1 to 4 m) is worth."""
+
+CANDIDATES, OPEN = 32, 1.0
+"""Positions whose views are compared by what is near, and the power of the share of an image that is not near."""
+
 
 def room_view(scene: Scene, room: str, fovy: float = FIELD_OF_VIEW) -> FreeView:
     """Where a person stands who wants to see most of a room.
 
     Of the positions in the room that keep clear of walls and tall furniture, and of directions around the circle, the
-    pair is taken in whose image most of the room's furniture and most of its floor lie.
+    pair is taken in whose image most of the room's furniture and most of its floor lie, and little of which
+    is filled by what is near.
 
     Raises UnknownNameError: the scene has no such room.
     """
     rooms = scene.rooms
     if rooms is None or room not in rooms.names:
         raise UnknownNameError("room", room, rooms.names if rooms is not None else ())
-    cells, targets = _cells(scene, room), _furniture(scene, room)[1]
+    cells, (_, targets, sizes) = _cells(scene, room), _furniture(scene, room)
     eyes = standing_places(scene, room)
-    points = np.concatenate([cells[:: max(1, len(cells) // 200)], np.repeat(targets, 12, axis=0)])
-    best = (-1.0, eyes[0], 0.0)
-    for eye in eyes:
-        offset = points - eye
-        far, angle = np.linalg.norm(offset, axis=1), np.arctan2(offset[:, 1], offset[:, 0])
-        for k in range(DIRECTIONS):
-            turn = 2 * math.pi * k / DIRECTIONS
-            seen = (np.abs((angle - turn + math.pi) % (2 * math.pi) - math.pi) < math.radians(0.62 * fovy)) & (
-                far > 0.9
-            )
-            score = float((seen / (1 + 0.25 * far)).sum())
-            if score > best[0]:
-                best = score, eye, turn
-    _, eye, turn = best
+    points = np.concatenate(
+        [
+            cells[:: max(1, len(cells) // 200)],
+            np.repeat(targets, np.round(PER_METRE * np.clip(sizes, 1.0, 4.0)).astype(int), axis=0),
+        ]
+    )
+    offset = points[None] - eyes[:, None]
+    far, angle = np.linalg.norm(offset, axis=2), np.arctan2(offset[..., 1], offset[..., 0])
+    turns = 2 * math.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    weight = np.where(far > 0.9, 1 / (1 + 0.25 * far), 0.0)
+    scores = np.stack(
+        [
+            (weight * (np.abs((angle - turn + math.pi) % (2 * math.pi) - math.pi) < math.radians(0.62 * fovy))).sum(1)
+            for turn in turns
+        ],
+        axis=1,
+    )
+    looked = np.argsort(-scores.max(axis=1), kind="stable")[:CANDIDATES]
+    stands = np.concatenate([eyes[looked], np.full((len(looked), 1), EYE_HEIGHT)], axis=1)
+    lines, skipped = SightLines(scene.model, through_glass=False), NEARNESS_DIRECTIONS // DIRECTIONS
+    near = nearness(lines, scene.start_data(), stands, 1.3 * fovy)[:, ::skipped]
+    best, k = np.unravel_index(int(np.argmax(scores[looked] * (1.0 - near) ** OPEN)), near.shape)
+    eye, turn = eyes[looked[best]], float(turns[k])
     at = np.array([*eye, EYE_HEIGHT]) + 2.0 * np.array(
         [
             math.cos(turn) * math.cos(math.radians(TILT)),
@@ -84,11 +103,11 @@ def _cells(scene: Scene, room: str) -> Float[np.ndarray, "n 2"]:
     return (np.stack([columns, rows], 1) + 0.5 - rooms.room_map.shape[0] / 2) * rooms.resolution
 
 
-def _furniture(scene: Scene, room: str) -> tuple[list[tuple[np.ndarray, np.ndarray, float]], np.ndarray]:
-    """World boxes of objects of the home with the distance to keep from them, and the middles of fixed ones in the
-    room."""
+def _furniture(scene: Scene, room: str) -> tuple[list[tuple[np.ndarray, np.ndarray, float]], np.ndarray, np.ndarray]:
+    """World boxes of objects of the home with the distance to keep from them; of fixed ones in the room the middles
+    [n, 2] and the diagonals [n], m."""
     data = scene.start_data()
-    boxes, middles = [], []
+    boxes, middles, sizes = [], [], []
     for entry in scene.manifest.objects:
         if not entry.in_household or entry.category in ("carpet", "window"):
             continue
@@ -100,7 +119,8 @@ def _furniture(scene: Scene, room: str) -> tuple[list[tuple[np.ndarray, np.ndarr
         boxes.append((middle - half, middle + half, FROM_DOORS if door else FROM_WALLS))
         if entry.fixed and not door and room in entry.rooms:
             middles.append(middle[:2])
-    return boxes, np.array(middles).reshape(-1, 2)
+            sizes.append(2 * float(np.linalg.norm(half)))
+    return boxes, np.array(middles).reshape(-1, 2), np.array(sizes)
 
 
 def _from_border(mask: np.ndarray, resolution: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What is seen from a point: rays against the opaque geoms of a model. Glass and hidden groups let them pass.
+"""What is seen from a point: rays against the geoms of a model. Hidden groups and, by default, glass let them pass.
 
 Axes: N points, K geoms.
 """
@@ -25,14 +25,15 @@ _FACES = np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)]) * _INSET
 class SightLines:
     """Rays in the states of one model."""
 
-    def __init__(self, model: mujoco.MjModel):
-        """A copy of the model is kept in which see-through geoms are hidden."""
+    def __init__(self, model: mujoco.MjModel, through_glass: bool = True):
+        """A copy of the model is kept in which see-through geoms are hidden, unless glass stops rays."""
         self._model = copy.copy(model)
         materials = model.geom_matid
         alpha = model.geom_rgba[:, 3].copy()
         if model.nmat:
             alpha = np.where(materials >= 0, np.minimum(alpha, model.mat_rgba[np.maximum(materials, 0), 3]), alpha)
-        self._model.geom_group[alpha < 1.0] = HIDDEN_GROUP
+        if through_glass:
+            self._model.geom_group[alpha < 1.0] = HIDDEN_GROUP
         self._groups = np.isin(np.arange(mujoco.mjNGROUP), VISIBLE_GROUPS).astype(np.uint8)
         self.opaque = np.isin(self._model.geom_group, VISIBLE_GROUPS)
         """bool [geoms]: which geoms stop a ray."""

@@ -103,7 +103,7 @@ def tour(scene: Scene, data: mujoco.MjData, rate: float | int = FRAME_RATE) -> I
     for k in range(count):
         turn = 90.0 + ABOVE_TURN * (k / count - 0.5)
         yield Shot(home_overview(scene, data, azimuth=turn, elevation=ABOVE_TILT), scene.name)
-    lines = SightLines(scene.model)
+    lines = SightLines(scene.model, through_glass=False)
     for stations in _walks(scene):
         yield from _looking_around(lines, data, stations, rate)
 
