@@ -60,7 +60,8 @@ def test_an_expression_gives_the_exit_status_and_says_what_is_missing(tiny_home_
         (["states", "--set", "cooked"], "STATE=OBJECT"),
         (["states", "--set", "cooked=apple=maybe"], "neither a number"),
         (["states", "--set", "cooked=table"], "not cookable"),
-        (["states", "--seconds", "-1"], "not negative"),
+        (["states", "--seconds", "-1"], "must be between 0 and"),
+        (["states", "--seconds", "1e308"], "must be between 0 and"),
         (["predicates", "(cooked aple)"], "near matches: apple"),
         (["predicates", "(cooked apple"], "close every bracket"),
         (["predicates", "--strict", "(cooked table)"], "not cookable"),
@@ -92,3 +93,20 @@ def test_the_switch_has_one_name_and_the_old_one_is_understood(tiny_home_folder,
     for name in ("toggled_on", "toggled"):
         out = _json(capsys, "states", str(tiny_home_folder), "--set", "toggled_on=stove", "--state", name)
         assert out["objects"]["stove"] == {"toggled_on": True}
+
+
+def test_long_simulations_report_how_far_they_are(monkeypatch):
+    import contextlib
+
+    from ig2mj.cli.common import worlds
+
+    said, taken = [], []
+
+    @contextlib.contextmanager
+    def progress(what):
+        yield lambda done, total, words="", /: said.append((done, total, words))
+
+    monkeypatch.setattr(worlds, "progress", progress)
+    worlds.simulate(taken.append, 25.0, 1 / 30)
+    assert sum(taken) == 750 and max(taken) == 300
+    assert said == [(0, 750, "0 of 25 s"), (300, 750, "10 of 25 s"), (600, 750, "20 of 25 s")]

@@ -57,7 +57,7 @@ def test_a_free_view_stands_where_it_was_put_and_looks_where_it_was_told(tiny_ho
         (["--from", "0", "0", "1"], "must be given together"),
         (["--from", "0", "0", "1", "--at", "0", "0", "1"], "same point"),
         (["--from", "nan", "0", "1", "--at", "0", "0", "0"], "finite"),
-        (["--seconds", "-1"], "not negative"),
+        (["--seconds", "-1"], "must be between 0 and"),
         (["--size", "0", "10"], "between 1 and 8192"),
         (["--camera", "no_such_camera"], "no camera is named 'no_such_camera'"),
     ],

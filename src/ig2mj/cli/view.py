@@ -108,6 +108,7 @@ def run(
         return
     import sys
 
+    from ig2mj.cli.common.worlds import simulate
     from ig2mj.scene.paths import model_file
     from ig2mj.viewer.interactive import check_display
 
@@ -118,8 +119,7 @@ def run(
         from ig2mj.simulation import Simulation
 
         world = Simulation(_with_robot(scene, object, robot, robot_at, looks))
-    if seconds > 0:
-        world.step(count=round(seconds * 30))
+    simulate(lambda count: world.step(count=count), seconds, world.engine.substeps * world.engine.timestep)
     world.launch_viewer(paused=paused)
 
 
@@ -133,15 +133,18 @@ def _only_policy(scene, *others) -> None:
 def _check(image, camera, eye, target, size, seconds) -> None:
     import math
 
-    numbers = [*(eye or ()), *(target or ()), seconds]
+    from ig2mj.cli.common.worlds import check_seconds
+
+    check_seconds(seconds)
+    numbers = [*(eye or ()), *(target or ())]
     if camera is not None and (eye or target):
         raise Ig2mjError("give either --camera or --from and --at")
     if (eye is None) != (target is None):
         raise Ig2mjError("--from and --at must be given together")
     if eye is not None and eye == target:
         raise Ig2mjError("--from and --at are the same point")
-    if not all(math.isfinite(n) for n in numbers) or seconds < 0:
-        raise Ig2mjError("--from, --at and --seconds must be finite, and --seconds not negative")
+    if not all(math.isfinite(n) for n in numbers):
+        raise Ig2mjError("--from and --at must be finite")
     if not all(1 <= n <= 8192 for n in size):
         raise Ig2mjError("--size must be between 1 and 8192 pixels")
     if image is None and (camera is not None or eye is not None):
@@ -248,13 +251,14 @@ def _write_image(home, file, camera, eye, target, size, seconds, collision) -> N
     import mujoco
     from PIL import Image
 
+    from ig2mj.cli.common.worlds import simulate
     from ig2mj.looks import visual_of
     from ig2mj.scene.geom_groups import VISIBLE_GROUPS
     from ig2mj.viewer.offscreen import default_backend, render
 
     data = home.start_data()
-    if seconds > 0:
-        mujoco.mj_step(home.model, data, nstep=max(1, round(seconds / home.model.opt.timestep)))
+    step = home.model.opt.timestep
+    simulate(lambda count: mujoco.mj_step(home.model, data, nstep=count), max(seconds, step) if seconds else 0.0, step)
     view = _view(home, data, camera, eye, target)
     backend = default_backend()
     groups = (3,) if collision else VISIBLE_GROUPS

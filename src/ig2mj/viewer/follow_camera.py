@@ -39,7 +39,7 @@ SMOOTH = 0.2
 PREFERRED = 55.0
 """Degrees to the side of the robot's back from which a view is best: hands are seen."""
 
-CROWDED, AROUND = 1.0, tuple((x, y) for x in (-0.6, -0.3, 0.3, 0.6) for y in (-0.3, 0.3))
+CROWDED, AROUND = 1.4, tuple((x, y) for x in (-0.6, -0.3, 0.3, 0.6) for y in (-0.3, 0.3))
 """m from the camera within which things fill the image; where it is tested (right and up, for one ahead)."""
 
 Vector = Float[np.ndarray, "3"]

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import pathlib
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 from ig2mj.errors import Ig2mjError
+from ig2mj.process.progress import progress
 
 if TYPE_CHECKING:
     from ig2mj.simulation import Simulation
+
+LONGEST, PART = 1e7, 10.0
+"""s: the longest time that commands simulate, and of what is simulated between two reports."""
 
 
 def started(
@@ -27,8 +30,7 @@ def started(
       check: of the other arguments of a command; raises before anything is set or simulated.
       objects: what is added to the home (`load_home`).
     """
-    if not math.isfinite(seconds) or seconds < 0:
-        raise Ig2mjError("--seconds must be finite and not negative")
+    check_seconds(seconds)
     parsed = [_parsed(setting) for setting in settings]
     from ig2mj.cli.common.objects import load_home
     from ig2mj.simulation import Simulation
@@ -38,8 +40,30 @@ def started(
     check(world)
     for name, name_of_object, value in parsed:
         world.set_state(name, name_of_object, value)
-    world.step(count=round(seconds / (world.engine.substeps * world.engine.timestep)))
+    simulate(lambda count: world.step(count=count), seconds, world.engine.substeps * world.engine.timestep)
     return world
+
+
+def check_seconds(seconds: float) -> None:
+    """Raises Ig2mjError: `--seconds` is no time that can be simulated."""
+    if not 0 <= seconds <= LONGEST:
+        raise Ig2mjError(f"--seconds {seconds:g} must be between 0 and {LONGEST:g}")
+
+
+def simulate(step: Callable[[int], object], seconds: float, period: float) -> None:
+    """Takes steps of `period` s for `seconds`, with progress; between parts of the way Ctrl-C is heard.
+
+    Args:
+      step: takes that many steps.
+    """
+    total, done = round(seconds / period), 0
+    part = max(1, round(PART / period))
+    with progress("simulating") as report:
+        while done < total:
+            report(done, total, f"{done * period:.0f} of {seconds:g} s")
+            count = min(part, total - done)
+            step(count)
+            done += count
 
 
 def _parsed(setting: str) -> tuple[str, str, bool | float]:
