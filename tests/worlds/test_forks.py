@@ -128,3 +128,21 @@ def test_a_goal_asked_of_donated_states_names_the_remedy(worlds, scene):
     for ask in (goal, goal.fraction, goal.literals_of, goal.explain):
         with pytest.raises(StaleStateError):
             ask(world.replace(states=arrays))
+
+
+def test_a_copied_simulation_is_a_fork_and_no_engine_is_pickled(scene, worlds):
+    import copy
+    import pickle
+
+    one = ig2mj.Simulation(scene)
+    one.step()
+    for copied in (copy.copy(one), copy.deepcopy(one)):
+        before = one.time
+        copied.step(count=3)
+        assert one.time == before and copied.time > before
+        one.step()
+    with pytest.raises(EngineError, match=r"sim\.save\(FILE\)"):
+        pickle.dumps(one)
+    for use in (copy.deepcopy, pickle.dumps):
+        with pytest.raises(EngineError, match=r"save\(batch, FILE\)"):
+            use(worlds)

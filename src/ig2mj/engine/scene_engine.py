@@ -18,6 +18,13 @@ class SceneEngine:
       boxes, touch_tolerance, model_fields: as given.
     """
 
+    scene: Scene
+    num_worlds: int
+
+    def __repr__(self) -> str:
+        count = f"{self.num_worlds} world{'s' * (self.num_worlds != 1)}"
+        return f"{type(self).__name__}('{self.scene.name}', {count})"
+
     def __init__(
         self,
         scene: Scene,

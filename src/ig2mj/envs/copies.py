@@ -7,38 +7,22 @@ import os
 import typing
 from typing import Any
 
+from ig2mj.engine.holder import EngineHolder
 from ig2mj.envs.checks import checked_state
 from ig2mj.envs.state import EnvState
 from ig2mj.envs.state_files import load_state, save_state
-from ig2mj.errors import EngineError
 from ig2mj.worlds.core import Core
 
-NO_COPY = (
-    "an environment holds its engine, and is neither copied nor pickled: ig2mj.make makes another one, in the"
-    " process that uses it; env.fork(state) copies a state, env.save(state, FILE) keeps one"
-)
-"""Of the error."""
 
-
-class StateCopies:
+class StateCopies(EngineHolder):
     """Part of `Environment`. Attributes: core: what steps its worlds."""
 
+    NO_COPY = (
+        "an environment holds its engine, and is neither copied nor pickled: ig2mj.make makes another one, in the"
+        " process that uses it; env.fork(state) copies a state, env.save(state, FILE) keeps one"
+    )
+
     core: Core
-
-    def __copy__(self) -> Any:
-        """An environment on the same engine."""
-        other = object.__new__(type(self))
-        for name, value in vars(self).items():
-            setattr(other, name, value)
-        return other
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Any:
-        """Raises EngineError."""
-        raise EngineError(f"{self!r}: {NO_COPY}")
-
-    def __reduce__(self) -> Any:
-        """Raises EngineError."""
-        raise EngineError(f"{self!r}: {NO_COPY}")
 
     def check(self, state: EnvState) -> None:
         """Raises StaleStateError: the state is stale, which is not known while tracing. ActionError: it is no state."""

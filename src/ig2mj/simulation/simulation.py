@@ -12,7 +12,6 @@ A core with a single world steps it (`ig2mj.worlds.core`), and all that changes 
 from __future__ import annotations
 
 import contextlib
-import copy
 import dataclasses
 import functools
 import os
@@ -27,6 +26,7 @@ import numpy as np
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Engine, Physics, Write, whole_number
+from ig2mj.engine.holder import EngineHolder
 from ig2mj.engine.registry import check_options, make_engine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 
 
 @entry_point
-class Simulation(Recorded):
+class Simulation(Recorded, EngineHolder):
     """One world of a scene on any engine.
 
     Attributes:
@@ -69,6 +69,8 @@ class Simulation(Recorded):
       state_options: how extended states behave; None where only physics is stepped.
       last_sampling: why candidates of the last `set_predicate` were turned down: {reason: how often}.
     """
+
+    NO_COPY = "a simulation holds its engine, and is not pickled: sim.save(FILE) keeps it, sim.load(FILE) continues it"
 
     _window: Callable[[], None] | None = None
 
@@ -249,9 +251,17 @@ class Simulation(Recorded):
         self._seed = seed
         return self.reset()
 
+    def __copy__(self) -> Simulation:
+        """As `fork`: two simulations never share a world."""
+        return self.fork()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Simulation:
+        """As `fork`."""
+        return self.fork()
+
     def fork(self) -> Simulation:
         """An independent simulation of the same world, which continues as this one does."""
-        new = copy.copy(self)
+        new = super().__copy__()
         new._recorder, new._window, new.last_sampling = None, None, dict(self.last_sampling)
         new._robots = None
         new._put(physics=self.engine.fork(self.physics))

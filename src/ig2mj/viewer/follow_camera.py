@@ -122,7 +122,7 @@ class FollowCamera:
         def value(view: FreeView) -> float:
             side = abs((view.azimuth - yaw + 180.0) % 360.0 - 180.0)  # 0: behind the robot's back
             worse = abs(side - PREFERRED) / 90.0 + 0.03 * abs(view.elevation - ELEVATIONS[0])
-            worse += DISTANCES.index(view.distance) + 3.0 * _crowded(model, data, view)
+            worse += DISTANCES.index(view.distance) + 6.0 * _crowded(model, data, view)
             return _seen(model, data, view, targets, own) - worse
 
         angles = [360.0 * k / SIDES for k in range(SIDES)]

@@ -24,6 +24,7 @@ from typing import Any
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.base import Engine, Write
+from ig2mj.engine.holder import EngineHolder
 from ig2mj.engine.view import Array
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process import entry_point
@@ -36,8 +37,13 @@ VERBS = ("start", "step", "reset", "rollout", "write", "fork", "save", "load", "
 
 
 @entry_point
-class Face:
+class Face(EngineHolder):
     """A core by its verbs. Attributes: core: what steps the worlds."""
+
+    NO_COPY = (
+        "worlds hold their engine, and are neither copied nor pickled: make others, in the process that uses them;"
+        " fork(batch) copies a batch, save(batch, FILE) keeps one"
+    )
 
     core: Core
 
