@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ig2mj.cli.common.tasks import task_option
+from ig2mj.files.shell import command
 
 if TYPE_CHECKING:
     from ig2mj.learn.bc import BCConfig
@@ -72,7 +73,7 @@ def train_from_demos(
     Policy.of(algorithm, learner, depends, made).save(file)
     print(file)
     option = task_option(chosen.env)
-    print(f"to evaluate it on held-out start states: ig2mj evaluate {file}{option}", file=sys.stderr)
+    print(f"to evaluate it on held-out start states: {command('evaluate', file)}{option}", file=sys.stderr)
     return 0
 
 

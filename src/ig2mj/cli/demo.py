@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from ig2mj.files.shell import command
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -52,7 +54,7 @@ def run(
         _look(console, step, scene, out / "images")
         failed += _cook(console, step, scene, out / "cooking")
         failed += _watch_expert(console, step, out / "expert.mp4")
-    console.print(f"{time.perf_counter() - start:.0f} s. Look around in it: [bold]ig2mj view {scene}[/]")
+    console.print(f"{time.perf_counter() - start:.0f} s. Look around in it: [bold]{command('view', scene)}[/]")
     return 1 if failed else 0
 
 

@@ -11,6 +11,7 @@ import tyro
 from ig2mj.cli.common.homes import entries_of, shipped_homes
 from ig2mj.cli.homes_content import MAX_HULLS, build, convert
 from ig2mj.cli.homes_images import images, sheet, tour
+from ig2mj.files.shell import command
 
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 
@@ -68,7 +69,7 @@ def make(
         passed = len(made.checks) - len(made.failed)
         rooms = f"{len(made.rooms)} room{'s' * (len(made.rooms) != 1)}"
         print(f"{made.folder}: {rooms}, {len(made.objects)} objects, "
-              f"{passed} of {len(made.checks)} checks passed (look: ig2mj view {made.folder})")  # fmt: skip
+              f"{passed} of {len(made.checks)} checks passed (look: {command('view', made.folder)})")  # fmt: skip
         for line in made.failed:
             print(f"  {line}")
     return 1 if made.failed else 0
@@ -108,7 +109,7 @@ def model(
         urdf = pathlib.Path(root) / "objects" / category / made / f"{made}.urdf"
         options = ConvertOptions(cache=False, max_hulls=MAX_HULLS, report=False)
         convert_object(urdf, category, out, model=made, fixed=entry.fixed, options=options)
-    print(f"{out}: {category}/{made}, {'fixed' if entry.fixed else 'loose'} (look: ig2mj view {out})")
+    print(f"{out}: {category}/{made}, {'fixed' if entry.fixed else 'loose'} (look: {command('view', out)})")
 
 
 def list_(

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ig2mj.files.shell import command
+
 if TYPE_CHECKING:
     from ig2mj.callbacks import ProgressCallback
 
@@ -58,7 +60,8 @@ def build(
         return
     print(f"{out}: {sum(built.values())} models of {len(built)} categories, {len(homes)} homes")
     if homes:
-        print(f"convert one: ig2mj convert scene --dataset {out} --scene {next(iter(homes))} --out OUT")
+        one = command("convert", "scene", "--dataset", out, "--scene", next(iter(homes)), "--out", "OUT")
+        print(f"convert one: {one}")
 
 
 def convert(

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from ig2mj.files.shell import command
+
 if TYPE_CHECKING:
     from ig2mj.scene.library import LibraryModel
 
@@ -114,7 +116,8 @@ def add(folder: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(meta
     count = f"{len(names)} object{'s' * (len(names) != 1)}"
     print(f"{path}: {count} ({', '.join(names[:8])}{', ...' * (len(names) > 8)}), kept in {registry_file()}")
     first = next((m for m in models if not m.entry.fixed), models[0])
-    print(f"try: ig2mj view small_home --object {first.reference}@{_place(first, 'breakfast_table_0')}")
+    place = f"{first.reference}@{_place(first, 'breakfast_table_0')}"
+    print(f"try: {command('view', 'small_home', '--object', place)}")
     return 0
 
 

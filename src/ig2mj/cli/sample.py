@@ -10,6 +10,7 @@ import tyro
 from ig2mj.cli.common.deprecated import renamed_options
 from ig2mj.cli.common.jobs import Cluster, Resume, where_of
 from ig2mj.cli.common.objects import AddedObjects
+from ig2mj.files.shell import command
 
 if TYPE_CHECKING:
     from ig2mj.cluster.job_runner import Where
@@ -112,7 +113,7 @@ def _sample(loaded, conditions, count: int, file: pathlib.Path, seed: int, where
                           "seconds": round(done.seconds, 3), "rejected": reasons, "failed": done.failed}))  # fmt: skip
     elif done.pool is not None:
         print(f"{file}: {done.pool.size} of {count} states of {loaded.name} in {done.seconds:.1f} s "
-              f"(look: ig2mj view {loaded.folder.name} --pool {file})")  # fmt: skip
+              f"(look: {command('view', scene, '--pool', file)})")  # fmt: skip
     tell_failures(done.failed, count)
     if lacking and not as_json:
         print(f"{lacking} of {count} rows could not be sampled", file=sys.stderr)

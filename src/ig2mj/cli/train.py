@@ -11,6 +11,7 @@ from ig2mj.cli.common.deprecated import renamed_options
 from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 from ig2mj.cli.common.tasks import task_option
+from ig2mj.files.shell import command
 
 if TYPE_CHECKING:
     from ig2mj.learn.run_config import RunOptions, RunSettings
@@ -251,7 +252,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
         videos.offer(best.file, result.row["seconds"], last=True)
         print(best.file)
         option = task_option(chosen.env)
-        print(f"to evaluate it on held-out start states: ig2mj evaluate {best.file}{option}", file=sys.stderr)
+        print(f"to evaluate it on held-out start states: {command('evaluate', best.file)}{option}", file=sys.stderr)
         return 0
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from ig2mj.cli.common.objects import AddedObjects
+from ig2mj.files.shell import command
 
 if TYPE_CHECKING:
     from ig2mj.vr.session import Session
@@ -153,7 +154,8 @@ def _play(session: Session, seconds: float, timing: bool, rate) -> None:
 def _ended(session: Session, common: dict) -> int:
     print(f"goal {'reached' if session.succeeded else 'not reached'}")
     if common["record_to"] is not None:
-        print(f"wrote {common['record_to']}; `ig2mj demos replay {common['record_to']} --check` replays it")
+        replay = command("demos", "replay", common["record_to"], "--check")
+        print(f"wrote {common['record_to']}; `{replay}` replays it")
     return 0
 
 

@@ -21,6 +21,7 @@ from ig2mj.envs.names import refuse_path
 from ig2mj.errors import InputError
 from ig2mj.files.content import decode_json
 from ig2mj.files.hdf5 import Hdf5File
+from ig2mj.files.shell import command
 from ig2mj.worlds.plugin_states import KEY
 
 FIX = "`ig2mj demos collect`, `ig2mj rollout --record FILE` and `ig2mj.demos.record` write recordings"
@@ -189,7 +190,7 @@ class Recording:
     def _read(self) -> None:
         self.header: dict[str, Any] = self._opened.attributes()
         if self.header.get("format") == DEMONSTRATIONS:
-            fix = f"`ig2mj demos convert {self.file} NEW` converts it"
+            fix = f"`{command('demos', 'convert', self.file, 'NEW')}` converts it"
             raise InputError(self.file, "is a demonstrations file of ig2mj 0.1.0", element="format", fix=fix)
         if self.header.get("format") != FORMAT:
             raise InputError(self.file, f"is not {FORMAT}", element="format", fix=FIX)

@@ -18,6 +18,7 @@ import re
 import msgspec
 
 from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
+from ig2mj.files.shell import command
 from ig2mj.knowledge.taxonomy import synset
 from ig2mj.scene import own_libraries, paths
 from ig2mj.scene.manifest import Manifest, ObjectEntry, load_manifest
@@ -200,7 +201,8 @@ def _no_such_model(requested: str, category: str, model: str, own: dict[str, dic
     path = pathlib.Path(requested).expanduser()
     if path.suffix.lower() == ".urdf":
         out = path.with_suffix("")
-        fix = f"`ig2mj convert object --urdf {path} --category CATEGORY --out {out}`, then give {out}"
+        convert = command("convert", "object", "--urdf", path, "--category", "CATEGORY", "--out", out)
+        fix = f"`{convert}`, then give {out}"
         return InputError(path, "is a URDF, not a converted object", fix=fix)
     if path.is_dir():
         problem = f"is a folder without {MANIFEST_FILE}, and no name of the object library"

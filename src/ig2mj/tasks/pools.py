@@ -25,6 +25,7 @@ from jaxtyping import Bool
 from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.registry import make_engine
 from ig2mj.errors import EngineError, InputError, UnknownNameError
+from ig2mj.files.shell import command
 from ig2mj.process import entry_point
 from ig2mj.process.processors import available
 from ig2mj.process.progress import progress as shown
@@ -140,7 +141,7 @@ def check_pool(task: Task, pool: Pool) -> None:
     """Raises InputError: the pool is of another version of a task in a user's code."""
     if task.code is not None and pool.starts is not None and pool.starts != starts_digest(task):
         problem = "what determines the start states has changed since the pool was made"
-        fix = f"ig2mj sample-task {shown_file(task.code.file)}:{task.name} makes another"
+        fix = f"{command('sample-task', f'{shown_file(task.code.file)}:{task.name}')} makes another"
         raise InputError(shown_file(task.code.file), problem, element=task.name, fix=fix)
 
 

@@ -42,6 +42,9 @@ PREFERRED = 55.0
 CROWDED, AROUND = 1.4, tuple((x, y) for x in (-0.6, -0.3, 0.3, 0.6) for y in (-0.3, 0.3))
 """m from the camera within which things fill the image; where it is tested (right and up, for one ahead)."""
 
+CROWD = 0.25
+"""Share of an image that is near at which another place is looked for at once."""
+
 Vector = Float[np.ndarray, "3"]
 
 _GROUPS = np.isin(np.arange(mujoco.mjNGROUP), VISIBLE_GROUPS).astype(np.uint8)
@@ -84,6 +87,7 @@ class FollowCamera:
             or focus != self._focus
             or self._count % AGAIN == 0
             or _seen(model, data, moved, seen, own) < 2.0 * len(seen)
+            or _crowded(model, data, moved) >= CROWD
         ):
             moved, self._focus = self._best(model, data, at, targets, own, moved), focus
             if _seen(model, data, moved, targets[: len(TALL)], own) < 2.0 * len(TALL):

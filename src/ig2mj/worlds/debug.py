@@ -19,6 +19,7 @@ from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.errors import EngineError
+from ig2mj.files.shell import command
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
@@ -120,7 +121,7 @@ class DebugWorlds(Face):
         text = f"{guards.explain(world, flags, overflow)}: {values}; step {step}"
         note = {"world": world, "step": step, "flags": flags, "overflow": overflow, "text": text}
         save_dump(frames_of(recording, world), file, scene.name, note, scene.model)
-        return f"{text}; the last {self.length} steps: ig2mj view {scene.folder} --dump {file}"
+        return f"{text}; the last {self.length} steps: {command('view', scene.folder, '--dump', file)}"
 
     def _values(self, batch: Batch, world: int, flags: int) -> list[str]:
         """For every flag, the number that is beyond its limit."""

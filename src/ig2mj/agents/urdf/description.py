@@ -8,6 +8,7 @@ import msgspec
 
 from ig2mj.errors import InputError
 from ig2mj.files.content import read_struct
+from ig2mj.files.shell import command
 
 ROBOT_FILE = "robot.json"
 
@@ -69,7 +70,7 @@ class Description(msgspec.Struct, frozen=True):
     def load(cls, folder: pathlib.Path) -> Description:
         """Raises InputError: there is no such file, it is broken, or of another version."""
         file = folder / ROBOT_FILE
-        again = f"convert the robot: ig2mj convert robot --urdf FILE --out {folder}"
+        again = f"convert the robot: {command('convert', 'robot', '--urdf', 'FILE', '--out', folder)}"
         made = read_struct(file, cls, fix=again)
         if made.format_version != FORMAT_VERSION:
             raise InputError(file, f"has format version {made.format_version}, not {FORMAT_VERSION}", fix=again)

@@ -5,6 +5,7 @@ It takes FILE.py:NAME, or activity/FILE.bddl.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -34,7 +35,7 @@ def task_option(name: str) -> str:
     from ig2mj.tasks.registry import split_reference
 
     own = split_reference(name) is not None or name.endswith(".bddl")
-    return f" --task {name}" if own else ""
+    return f" --task {shlex.quote(name)}" if own else ""
 
 
 ROWS = 8
