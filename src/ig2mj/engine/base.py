@@ -19,7 +19,7 @@ na as in MuJoCo.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
@@ -372,6 +372,29 @@ class Engine(Protocol):
         copies.
         """
         ...
+
+
+class EngineHolder:
+    """Mixin of what holds an engine: `copy.copy` gives another object on it; `copy.deepcopy` and `pickle` raise
+    EngineError, since a copy would share what the engine steps. States of worlds are copied instead (`fork`, `save`).
+    """
+
+    NO_COPY: ClassVar[str] = "it holds its engine, and is neither copied nor pickled"
+    """Of the error: why, and what is done instead."""
+
+    def __copy__(self) -> Any:
+        """Another object on the same engine."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
+        return other
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Any:
+        """Raises EngineError."""
+        raise EngineError(f"{self!r}: {self.NO_COPY}")
+
+    def __reduce__(self) -> Any:
+        """Raises EngineError."""
+        raise EngineError(f"{self!r}: {self.NO_COPY}")
 
 
 def check_pure(engine: Engine, error: Exception) -> None:

@@ -7,7 +7,7 @@ import os
 import typing
 from typing import Any
 
-from ig2mj.engine.holder import EngineHolder
+from ig2mj.engine.base import EngineHolder
 from ig2mj.envs.checks import checked_state
 from ig2mj.envs.state import EnvState
 from ig2mj.envs.state_files import load_state, save_state

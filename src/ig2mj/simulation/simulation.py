@@ -25,8 +25,7 @@ import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import Grasping
-from ig2mj.engine.base import Engine, Physics, Write, whole_number
-from ig2mj.engine.holder import EngineHolder
+from ig2mj.engine.base import Engine, EngineHolder, Physics, Write, whole_number
 from ig2mj.engine.registry import check_options, make_engine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView

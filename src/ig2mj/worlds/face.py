@@ -23,8 +23,7 @@ from typing import Any
 
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.base import Engine, Write
-from ig2mj.engine.holder import EngineHolder
+from ig2mj.engine.base import Engine, EngineHolder, Write
 from ig2mj.engine.view import Array
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process import entry_point
