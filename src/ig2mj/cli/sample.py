@@ -69,7 +69,8 @@ def run(
     loaded = load_scene(scene, objects=object)
     if disturb:
         return _disturb(loaded, count, file, seed, share, where)
-    return _sample(loaded, conditions, count, file, seed, where, json)
+    look = command("view", scene, "--pool", file)
+    return _sample(loaded, conditions, count, file, seed, where, look="" if json else look)
 
 
 def _disturb(loaded, count: int, file: pathlib.Path, seed: int, share: float, where: Where) -> int:
@@ -90,7 +91,8 @@ def _disturb(loaded, count: int, file: pathlib.Path, seed: int, share: float, wh
     return 0
 
 
-def _sample(loaded, conditions, count: int, file: pathlib.Path, seed: int, where: Where, as_json: bool) -> int:
+def _sample(loaded, conditions, count: int, file: pathlib.Path, seed: int, where: Where, look: str) -> int:
+    """`look`: the command that shows the pool; '': the result is printed as JSON."""
     import json
     import sys
 
@@ -107,15 +109,15 @@ def _sample(loaded, conditions, count: int, file: pathlib.Path, seed: int, where
         if not done.failed:
             journal.finish()
     lacking = count - len(done.rows) - len(done.failed)
-    if as_json:
+    if not look:
         reasons = dict(done.rejected.most_common())
         print(json.dumps({"file": str(file) if done.pool else None, "rows": len(done.rows), "requested": count,
                           "seconds": round(done.seconds, 3), "rejected": reasons, "failed": done.failed}))  # fmt: skip
     elif done.pool is not None:
         print(f"{file}: {done.pool.size} of {count} states of {loaded.name} in {done.seconds:.1f} s "
-              f"(look: {command('view', scene, '--pool', file)})")  # fmt: skip
+              f"(look: {look})")  # fmt: skip
     tell_failures(done.failed, count)
-    if lacking and not as_json:
+    if lacking and look:
         print(f"{lacking} of {count} rows could not be sampled", file=sys.stderr)
         rows = [(reason, str(n)) for reason, n in done.rejected.most_common(12)]
         stdout_console().print(make_table("why candidates were turned down", ("reason", "times"), rows))
