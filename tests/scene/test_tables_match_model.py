@@ -27,6 +27,18 @@ def test_every_body_and_geom_of_an_object_is_its_own(tiny_home):
     assert tables.geom_object[model.geom("cabinet_door/collision_0").id] == index(tiny_home, "cabinet")
 
 
+def test_bodies_rest_where_no_joint_holds_them(tiny_home):
+    tables, model = tiny_home.tables, tiny_home.model
+    data = mujoco.MjData(model)
+    data.qpos[:] += 0.2
+    mujoco.mj_kinematics(model, data)
+    own = tables.body_object >= 0
+    stays = np.linalg.norm(data.xpos - tables.body_rest_pos, axis=1) < 1e-9
+    np.testing.assert_array_equal(tables.body_rests, own & stays & (model.body_weldid == 0))
+    assert not tables.body_rests[model.body("cabinet_door").id], "a door is no part that rests"
+    assert 0 < tables.body_rests.sum() < own.sum()
+
+
 def test_openable_joints_carry_addresses_and_ends(tiny_home):
     tables, model = tiny_home.tables, tiny_home.model
     names = ["cabinet_drawer_slide", "cabinet_door_hinge"]

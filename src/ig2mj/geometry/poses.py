@@ -80,16 +80,16 @@ def quat_rotate_inverse(q: Quat, v: Vec) -> Float[Array, "*b 3"]:
 
 def quat_to_matrix(q: Quat) -> Float[Array, "*b 3 3"]:
     """Rotation matrix whose columns are the child's axes in the parent frame."""
-    rows = _matrix_rows(*(q[..., i] for i in range(4)))
+    rows = matrix_rows(*(q[..., i] for i in range(4)))
     return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def quats_to_matrices(q: Float[Array, "n 4 W"]) -> Float[Array, "3 3 n W"]:
     """`quat_to_matrix` with worlds last."""
-    return jnp.stack([jnp.stack(row) for row in _matrix_rows(*(q[:, i] for i in range(4)))])
+    return jnp.stack([jnp.stack(row) for row in matrix_rows(*(q[:, i] for i in range(4)))])
 
 
-def _matrix_rows(w: AnyArray, x: AnyArray, y: AnyArray, z: AnyArray) -> list[list[Any]]:
+def matrix_rows(w: AnyArray, x: AnyArray, y: AnyArray, z: AnyArray) -> list[list[Any]]:
     """Of one rotation, too, whose entries are numbers."""
     return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

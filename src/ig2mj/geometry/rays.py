@@ -63,7 +63,7 @@ def sphere_interval(
     origin: Float[AnyArray, "*#b 3"], direction: Float[AnyArray, "*#b 3"], radius: Float[AnyArray, "*#b"] | float
 ) -> Interval:
     """Interval of a line inside a sphere about the frame's origin."""
-    return _quadratic_interval(
+    return quadratic_interval(
         jnp.sum(direction * direction, axis=-1),
         jnp.sum(origin * direction, axis=-1),
         jnp.sum(origin * origin, axis=-1),
@@ -80,7 +80,7 @@ def cylinder_interval(
     """Interval of a line inside a cylinder along z."""
     origin, direction = jnp.asarray(origin), jnp.asarray(direction)
     o, d = origin[..., :2], direction[..., :2]
-    side = _quadratic_interval(jnp.sum(d * d, axis=-1), jnp.sum(o * d, axis=-1), jnp.sum(o * o, axis=-1), radius)
+    side = quadratic_interval(jnp.sum(d * d, axis=-1), jnp.sum(o * d, axis=-1), jnp.sum(o * o, axis=-1), radius)
     top = _half_space_interval(direction[..., 2], half - origin[..., 2])
     bottom = _half_space_interval(-direction[..., 2], half + origin[..., 2])
     return _intersect(side, _intersect(top, bottom))
@@ -193,7 +193,7 @@ def _half_space_interval(slope: Float[AnyArray, "*#b"], room: Float[AnyArray, "*
     return jnp.where(leaving, -jnp.inf, t), jnp.where(leaving, t, jnp.inf)
 
 
-def _quadratic_interval(
+def quadratic_interval(
     a: Float[AnyArray, "*#b"],
     b: Float[AnyArray, "*#b"],
     c: Float[AnyArray, "*#b"],

@@ -70,6 +70,7 @@ def build_tables(
         object_both_sides=np.array([o.openable_both_sides for o in objects], bool),
         body_object=body_object,
         geom_object=geom_object,
+        **_resting_columns(model, body_object),
         **_openable_columns(model, objects, find),
         **_link_columns(model, objects, body_object, find, file),
         **_piece_columns(model, geom_object, file),
@@ -95,6 +96,13 @@ def _body_owners(model: mujoco.MjModel, objects: list[ObjectEntry], find: _Names
         if owner[body] < 0:
             owner[body] = owner[model.body_parentid[body]]
     return owner
+
+
+def _resting_columns(model: mujoco.MjModel, body_object: np.ndarray) -> dict[str, Any]:
+    rests = (model.body_weldid == 0) & (model.body_mocapid < 0) & (body_object >= 0)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return {"body_rests": rests, "body_rest_pos": np.array(data.xpos), "body_rest_quat": np.array(data.xquat)}
 
 
 def _check_fixed(model: mujoco.MjModel, objects: list[ObjectEntry], body_object: np.ndarray, file: object) -> None:

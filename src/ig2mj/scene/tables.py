@@ -45,6 +45,8 @@ class SceneTables:
       object_is_floor: category "floors"; object_mass: kg, whole object.
       object_bbox: bounding box at joint positions 0, base axes. object_bbox_center: its centre in the base frame.
       body_object, geom_object: owner of each body and geom, -1 for none (the world, agents).
+      body_rests: it belongs to an object, and no joint is between it and the world: it never moves.
+      body_rest_pos, body_rest_quat: where it is then (m, w-x-y-z); of other bodies, where they start.
       openable_*: joints that count for Open: owner, address in qpos, closed and open end.
       object_both_sides: `openable_both_sides`.
       link_*: annotated links: owner, kind, body they ride on, pose in that body, geom id (-1: a site), half size (0: a
@@ -81,6 +83,9 @@ class SceneTables:
     object_both_sides: Bool[np.ndarray, "O"]
     object_rooms: Bool[np.ndarray, "O R"]
     body_object: Int[np.ndarray, "B"]
+    body_rests: Bool[np.ndarray, "B"]
+    body_rest_pos: Float[np.ndarray, "B 3"]
+    body_rest_quat: Float[np.ndarray, "B 4"]
     geom_object: Int[np.ndarray, "G"]
     openable_object: Int[np.ndarray, "J"]
     openable_qposadr: Int[np.ndarray, "J"]

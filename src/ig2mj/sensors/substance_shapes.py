@@ -127,13 +127,14 @@ def streams_of(model: StateModel, states: ExtendedStates, view: PhysicsView, wor
     volume, stock = np.asarray(states.volume)[world], np.asarray(states.stock)[world]
     free = np.where(np.asarray(states.solid)[world], 0.0, volume)
     openings = containers.openings(view)
-    down = np.asarray(openings.normal)[world, :, 2] < 0
+    down = np.asarray(openings.normal[2])[world] < 0
     flows = (volume.sum(-1) > np.asarray(containers.holds(view))[world] + CONTAINS) & (free.sum(-1) > 0)
     gives = down & stock.any(-1)
     if not (flows | gives).any():
         return []
     low, high = np.asarray(view.aabb_low)[world], np.asarray(view.aabb_high)[world]
-    starts, outs = np.asarray(openings.lowest())[world], np.asarray(openings.outwards())[world]
+    begins = openings.lowest(), openings.outwards()
+    starts, outs = (np.stack([np.asarray(n)[world] for n in vectors], axis=-1) for vectors in begins)
     made = []
     for row in np.flatnonzero(flows | gives):
         amount = np.where(stock[row], 1.0, 0.0) if gives[row] and not flows[row] else free[row]

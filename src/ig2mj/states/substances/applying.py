@@ -23,7 +23,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
-from ig2mj.geometry.poses import quat_rotate, quat_to_matrix
+from ig2mj.geometry.frames import Frames, numbers
+from ig2mj.geometry.poses import quat_rotate
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep
 from ig2mj.states.substances import coat
@@ -74,15 +75,12 @@ def dipped(step: EventStep) -> Bool[Array, "W A C"]:
     """Which object that can absorb is in which container."""
     found, view = of(step.model), step.view
     rows, containers = found.row[absorbers(step.model)], found.containers
-    own_pos, own_quat = (jnp.asarray(x)[:, found.body[rows]] for x in (view.body_pos, view.body_quat))
-    points = own_pos + quat_rotate(own_quat, found.pos[rows])  # [W, A, N, 3]
-    pos, quat = (jnp.asarray(x)[:, containers.body] for x in (view.body_pos, view.body_quat))
-    axes = quat_to_matrix(quat)[:, None, :, None]  # [W, 1, C, 1, 3, 3]
-    offset = [points[:, :, None, :, i] - pos[:, None, :, None, i] for i in range(3)]
-    within = jnp.ones((1, 1, 1, 1), bool)  # [W, A, C, N], number by number: one kernel
-    for j in range(3):
-        local = sum(axes[..., i, j] * offset[i] for i in range(3))
-        within &= (local >= found.things.low[:, None, j]) & (local <= found.things.high[:, None, j])
+    points = Frames.of(view.body_pos, view.body_quat, found.body[rows]).points(numbers(found.pos[rows]))  # [W, A, N]
+    frames = containers.frames(view).with_axes(1, 3)  # [W, 1, C, 1]
+    local = frames.local(frames.offset([x[:, :, None] for x in points]))
+    within = jnp.ones((1, 1, 1, 1), bool)  # [W, A, C, N]
+    for x, low, high in zip(local, numbers(found.things.low), numbers(found.things.high), strict=True):
+        within &= (x >= low[:, None]) & (x <= high[:, None])
     there = jnp.any(within, axis=-1)
     return there & (containers.object != absorbers(step.model)[:, None])
 
@@ -105,21 +103,17 @@ def applied(step: EventStep, there: Bool[Array, "W A C"]) -> Applied:
     """What is to be applied. `there`: from `dipped`."""
     model, states, found = step.model, step.states, of(step.model)
     worlds, width = states.temperature.shape[0], len(found.names)
-    own, brushes, rows = absorbers(model), _of(model, BRUSHES), sprays(model)
+    own, rows = absorbers(model), sprays(model)
     free = jnp.where(states.solid, 0.0, states.volume)
     soaks = jnp.zeros((worlds, len(own), len(found.containers.object), width))
     if len(own) and len(found.containers.object):
-        lacks = coat.saturation(model)[own].astype(np.float32)[:, None] - coat.absorbed_drops(model, states, own)
-        wants = jnp.maximum(lacks, 0.0) * coat.DROP  # litres [W, A, U]
+        wants = jnp.maximum(_lacking(step), 0.0) * coat.DROP  # litres [W, A, U]
         has = free >= CONTAINS
         first = np.arange(there.shape[2]) == jnp.argmax(there & jnp.any(has, axis=-1)[:, None], axis=2)[..., None]
         number = jnp.maximum(jnp.sum(there, axis=1), 1)[:, None, :, None]  # they share
         soaks = jnp.minimum(wants[:, :, None], jnp.where(has, free, 0.0)[:, None] / number)
         soaks = jnp.where((there & first)[..., None], soaks, 0.0)
-    loaded = jnp.zeros((worlds, len(brushes), width), bool)
-    if len(brushes):
-        touches = jnp.any(jnp.asarray(step.view.touching)[:, brushes][:, :, found.covered], axis=-1)
-        loaded = touches[..., None] & (coat.absorbed_drops(model, states, brushes) >= 1.0 / POINTS_PER_DROP)
+    loaded = _loaded(step)
     on = jnp.asarray(states.toggled_on)[:, found.containers.object[rows]][..., None]
     litres = np.float32(SPRAY_RATE * model.options.timestep)
     given = jnp.where(on & jnp.asarray(states.stock)[:, rows] & ~states.solid[:, rows], litres, 0.0)
@@ -127,6 +121,35 @@ def applied(step: EventStep, there: Bool[Array, "W A C"]) -> Applied:
     total = jnp.sum(content, axis=-1, keepdims=True)
     out = jnp.where(on & (given <= 0), content / jnp.maximum(total, 1e-12) * jnp.minimum(total, litres), 0.0)
     return Applied(soaks, loaded, out + given, given)
+
+
+def _lacking(step: EventStep) -> Float[Array, "W A U"]:
+    """Drops that objects that can absorb lack."""
+    own = absorbers(step.model)
+    enough = coat.saturation(step.model)[own].astype(np.float32)[:, None]
+    return enough - coat.absorbed_drops(step.model, step.states, own)
+
+
+def _loaded(step: EventStep) -> Bool[Array, "W B U"]:
+    """With what brushes cover what they touch."""
+    model, brushes, found = step.model, _of(step.model, BRUSHES), of(step.model)
+    if not len(brushes):
+        return jnp.zeros((step.states.temperature.shape[0], 0, len(found.names)), bool)
+    touches = jnp.any(jnp.asarray(step.view.touching)[:, brushes][:, :, found.covered], axis=-1)
+    return touches[..., None] & (coat.absorbed_drops(model, step.states, brushes) >= 1.0 / POINTS_PER_DROP)
+
+
+def may_act(step: EventStep, there: Bool[Array, "W A C"]) -> Bool[Array, ""]:
+    """False: nothing is applied. It costs less than `applied`. `there`: from `dipped`."""
+    found, states = of(step.model), step.states
+    acts = jnp.any(_loaded(step))
+    if there.size:
+        has = (jnp.asarray(states.volume) >= CONTAINS) & ~states.solid
+        acts |= jnp.any(there[..., None] & has[:, None] & (_lacking(step) > 0.0)[:, :, None])
+    rows = sprays(step.model)
+    if len(rows):
+        acts |= jnp.any(jnp.asarray(states.toggled_on)[:, found.containers.object[rows]])
+    return acts
 
 
 def rests(made: Applied) -> Bool[Array, ""]:

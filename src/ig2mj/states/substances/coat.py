@@ -13,13 +13,14 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import quat_rotate
+from ig2mj.geometry.frames import Frames, dot, numbers
+from ig2mj.geometry.poses import matrix_rows, quat_rotate
+from ig2mj.states.branches import changed_where
 from ig2mj.states.definitions import cleaning, wetness
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import Cut, EventStep, Saved, StateSpec
@@ -147,13 +148,15 @@ def points_near(model: StateModel, landed: Landed, view: PhysicsView) -> UInt32[
         return jnp.zeros(landed.object.shape, jnp.uint32)
     row = jnp.minimum(jnp.asarray(found.row)[landed.object], len(found.covered) - 1)  # [W, K]
     body, at = jnp.asarray(found.body)[row], jnp.asarray(found.pos)[row]  # [W, K, N(, 3)]
-    flat = body.reshape(len(body), -1, 1)
-    pos, quat = (
-        jnp.take_along_axis(jnp.asarray(field), flat, axis=1).reshape(*body.shape, -1)
-        for field in (view.body_pos, view.body_quat)
-    )
-    offset = pos + quat_rotate(quat, at) - landed.pos[:, :, None]
-    distance = jnp.sum(offset * offset, axis=-1)
+    flat = body.reshape(len(body), -1)
+
+    def of_bodies(field: Array) -> list[Array]:
+        columns = numbers(jnp.asarray(field))
+        return [jnp.take_along_axis(column, flat, axis=1).reshape(body.shape) for column in columns]
+
+    frames = Frames(matrix_rows(*of_bodies(view.body_quat)), of_bodies(view.body_pos))
+    offset = [p - x[..., None] for p, x in zip(frames.points(numbers(at)), landed.pos, strict=True)]
+    distance = dot(offset, offset)
     return as_bits((distance <= NEAR**2) | (distance <= jnp.min(distance, axis=-1, keepdims=True)))
 
 
@@ -180,7 +183,11 @@ def wipe(step: EventStep) -> EventStep:
         return step
 
     meeting = _meeting(step)
-    return step.having(**jax.lax.cond(jnp.any(meeting), lambda: _wiped(step, meeting), lambda: _fields(step.states)))
+
+    def wiped(fields: dict[str, Array]) -> dict[str, Array]:
+        return _wiped(step.having(**fields), meeting)
+
+    return step.having(**changed_where(jnp.any(meeting), wiped, _fields(step.states)))
 
 
 def _fields(states: ExtendedStates) -> dict[str, Array]:

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import quat_rotate, quat_rotate_inverse
+from ig2mj.geometry.frames import Frames, Numbers, dot, numbers
 from ig2mj.scene.manifest import InsideEntry
 from ig2mj.scene.tables import SceneTables
 
@@ -87,12 +87,15 @@ class Containers:
         found = np.flatnonzero(self.object == obj)
         return int(found[0]) if len(found) else None
 
+    def frames(self, view: PhysicsView) -> Frames:
+        """Poses of their bodies [W, C]."""
+        return Frames.of(view.body_pos, view.body_quat, self.body)
+
     def holds(self, view: PhysicsView) -> Float[Array, "W C"]:
         """Litres that stay in each container as it stands."""
-        up = quat_rotate_inverse(jnp.asarray(view.body_quat)[:, self.body], np.array([0.0, 0.0, 1.0], np.float32))
-        along = jnp.sum(up * self.normal, axis=-1)
-        across = jnp.cross(self.normal, self.side)
-        x, y = jnp.sum(up * self.side, axis=-1), jnp.sum(up * across, axis=-1)
+        up = self.frames(view).up()
+        across = np.cross(self.normal, self.side).astype(np.float32)
+        along, x, y = (dot(up, numbers(axis)) for axis in (self.normal, self.side, across))
         tilt = jnp.arctan2(jnp.sqrt(x * x + y * y), along) * ((TILTS - 1) / np.pi)
         turn = jnp.mod(jnp.arctan2(y, x) * (DIRECTIONS / (2 * np.pi)), DIRECTIONS)
         row = jnp.clip(jnp.floor(tilt), 0, TILTS - 2).astype(int)
@@ -107,28 +110,32 @@ class Containers:
 
     def openings(self, view: PhysicsView) -> Openings:
         """Where the openings are."""
-        pos, quat = (jnp.asarray(field)[:, self.body] for field in (view.body_pos, view.body_quat))
-        rim = pos[:, :, None] + quat_rotate(quat[:, :, None], self.rim)
-        return Openings(rim, pos + quat_rotate(quat, self.centre), quat_rotate(quat, self.normal))
+        frames = self.frames(view)
+        rim = frames.with_axes(2).points(numbers(self.rim))
+        return Openings(rim, frames.points(numbers(self.centre)), frames.turned(numbers(self.normal)))
 
 
 class Openings(NamedTuple):
-    """World frame, m: corners of the rims, their means, and unit normals that point out."""
+    """Number by number, world frame, m: corners of the rims [W, C, R], their means, and unit normals that point out
+    [W, C]."""
 
-    rim: Float[Array, "W C R 3"]
-    centre: Float[Array, "W C 3"]
-    normal: Float[Array, "W C 3"]
+    rim: Numbers
+    centre: Numbers
+    normal: Numbers
 
-    def lowest(self) -> Float[Array, "W C 3"]:
+    def lowest(self) -> Numbers:
         """The lowest place of each rim: the mean of its lowest corners, of an edge its middle."""
-        height = self.rim[..., 2]
+        height = self.rim[2]
         weight = jnp.maximum(LOWEST - (height - jnp.min(height, axis=-1, keepdims=True)), 0.0)
-        return jnp.sum(weight[..., None] * self.rim, axis=2) / jnp.sum(weight, axis=2)[..., None]
+        total = jnp.sum(weight, axis=-1)
+        return [jnp.sum(weight * n, axis=-1) / total for n in self.rim]
 
-    def outwards(self) -> Float[Array, "W C 2"]:
+    def outwards(self) -> Numbers:
         """Horizontal unit vectors in which the openings point; of one that points up or down, to its lowest place."""
-        way = self.normal[..., :2] + SMALL * (self.lowest() - self.centre)[..., :2]
-        return way / jnp.maximum(jnp.sqrt(jnp.sum(way * way, axis=-1, keepdims=True)), 1e-6)
+        lowest = self.lowest()
+        way = [self.normal[i] + SMALL * (lowest[i] - self.centre[i]) for i in range(2)]
+        length = jnp.maximum(jnp.sqrt(dot(way, way)), 1e-6)
+        return [n / length for n in way]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

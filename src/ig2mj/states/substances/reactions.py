@@ -199,7 +199,7 @@ def _objects_changed(step: EventStep, now: _Now) -> EventStep:
     baked = jnp.any(placed & jnp.any(now.first & heats, axis=-1)[..., None], axis=1)
     numbers = np.arange(1, placed.shape[1] + 1, dtype=np.int32)[:, None]
     origin = 2 * jnp.sum(jnp.where(placed, numbers, 0), axis=1) + baked
-    centre = found.containers.openings(step.view).centre
+    centre = jnp.stack(found.containers.openings(step.view).centre, axis=-1)
     over = jnp.sum(jnp.where(placed[..., None], centre[:, :, None], 0.0), axis=1)
     over = over + jnp.stack([0.0 * number, 0.0 * number, things.DROP + things.APART * number], axis=-1)
     moves, columns = comes | goes, _columns(model)

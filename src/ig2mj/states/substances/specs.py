@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
-import jax
 import jax.numpy as jnp
 
 from ig2mj.engine.view import Array
+from ig2mj.states.branches import changed_where
 from ig2mj.states.definitions.dust import DUST
 from ig2mj.states.definitions.stain import STAIN
 from ig2mj.states.spec import EventStep, StateSpec
@@ -25,20 +25,24 @@ def _cleaned(step: EventStep) -> EventStep:
     applies = applying.exist(model)
     if not applies and not washing.has_machines(model):
         return coat.wipe(step)
-    made = applying.applied(step, applying.dipped(step)) if applies else None
+    there = applying.dipped(step) if applies else None
     acts = ~(coat.wipes_nothing(step) & washing.rests(step))
-    if made is not None:
-        acts |= ~applying.rests(made)
+    if there is not None:
+        acts |= applying.may_act(step, there)
 
-    def act() -> tuple[list[Array], list[Array]]:
-        before = step if made is None else applying.update(step, made)
-        return _changing(washing.update(coat.wipe(before)).states)
+    def act(fields: tuple[list[Array], list[Array]]) -> tuple[list[Array], list[Array]]:
+        now = _having(step, fields)
+        now = now if there is None else applying.update(now, applying.applied(now, there))
+        return _changing(washing.update(coat.wipe(now)).states)
 
-    fields, alive = jax.lax.cond(acts, act, lambda: _changing(step.states))
+    return _having(step, changed_where(acts, act, _changing(step.states)))
+
+
+def _having(step: EventStep, fields: tuple[list[Array], list[Array]]) -> EventStep:
     particles = [
-        dataclasses.replace(getattr(step.states, kind.name), alive=a) for kind, a in zip(DIRT, alive, strict=True)
+        dataclasses.replace(getattr(step.states, kind.name), alive=a) for kind, a in zip(DIRT, fields[1], strict=True)
     ]
-    return step.having(**dict(zip((*CLEANED, *(kind.name for kind in DIRT)), (*fields, *particles), strict=True)))
+    return step.having(**dict(zip((*CLEANED, *(kind.name for kind in DIRT)), (*fields[0], *particles), strict=True)))
 
 
 def _changing(states: ExtendedStates) -> tuple[list[Array], list[Array]]:

@@ -19,11 +19,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.frames import numbers
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep, Saved, StateSpec, nothing_inherited
 from ig2mj.states.substances import coat
 from ig2mj.states.substances.model import of
-from ig2mj.states.substances.streams import MOST, Landed, falling_from, land
+from ig2mj.states.substances.streams import MOST, Falling, Landed, land
 
 if TYPE_CHECKING:
     from ig2mj.states.world import ExtendedStates
@@ -71,7 +72,7 @@ class Standing(NamedTuple):
 def standing(model: StateModel, view: PhysicsView) -> Standing:
     """How containers stand in a view."""
     containers = of(model).containers
-    return Standing(containers.holds(view), containers.openings(view).normal[..., 2] < 0.0)
+    return Standing(containers.holds(view), containers.frames(view).turned(numbers(containers.normal))[2] < 0.0)
 
 
 def outflow(model: StateModel, states: ExtendedStates, volume: Float[Array, "W C U"], stand: Standing) -> Outflow:
@@ -169,8 +170,9 @@ def poured(step: EventStep, out: Outlets, ends: Streams) -> EventStep:
     flows = jnp.any(out.chosen, axis=1)[..., None]
     left, given = (jnp.where(flows[:, :count], x, 0.0) for x in out.flow)
     from_taps = jnp.where(flows[:, count:], out.from_taps, 0.0)
-    amounts = jnp.concatenate([left + given, from_taps], axis=1)  # [W, E, U]
-    amounts = jnp.sum(jnp.where(out.chosen[..., None], amounts[:, None], 0.0), axis=2)  # [W, K, U]
+    parts = (out.chosen[:, :, :count], left + given), (out.chosen[:, :, count:], from_taps)
+    one, other = (jnp.sum(jnp.where(own[..., None], x[:, None], 0.0), axis=2) for own, x in parts)
+    amounts = one + other  # [W, K, U]
     into = jnp.sum(jnp.where(ends.landed.container[..., None], amounts[:, :, None], 0.0), axis=1)
     outside = jnp.where(jnp.any(ends.landed.container, axis=-1)[..., None], 0.0, amounts)
     states = dataclasses.replace(
@@ -196,33 +198,28 @@ def streams(step: EventStep, chosen: Bool[Array, "W K E"]) -> Streams:
     worlds, most = chosen.shape[:2]
 
     def follow() -> Streams:
-        start, aside = _beginnings(model, view)
-        falling = falling_from(
-            jnp.any(chosen, axis=-1),
-            jnp.sum(jnp.where(chosen[..., None], start[:, None], 0.0), axis=2),
-            jnp.sum(jnp.where(chosen[..., None], aside[:, None], 0.0), axis=2),
-            chosen[:, :, : len(containers.body)],
-            _origins(model, chosen),
-            containers.openings(view),
-            view,
-        )
-        landed = land(model.tables, containers, falling)
+        count = len(containers.body)
+        openings, taps = containers.openings(view), numbers(jnp.asarray(view.link_pos)[:, _tap_links(model)])
+        of_containers, of_taps = chosen[:, :, :count], chosen[:, :, count:]
+        begins = zip(openings.lowest(), taps, strict=True)
+        start = [_of_chosen(of_containers, rim) + _of_chosen(of_taps, tap) for rim, tap in begins]
+        aside = [_of_chosen(of_containers, n) for n in openings.outwards()]
+        falling = Falling(jnp.any(chosen, axis=-1), start, aside, of_containers, _origins(model, chosen))
+        landed = land(model.tables, containers, falling, view)
         return Streams(landed, coat.points_near(model, landed, view))
 
     def none() -> Streams:
         container = jnp.zeros((worlds, most, len(containers.body)), bool)
         nothing = jnp.full((worlds, most), -1, jnp.int32)
-        return Streams(Landed(container, nothing, jnp.zeros((worlds, most, 3))), jnp.zeros((worlds, most), jnp.uint32))
+        nowhere = [jnp.zeros((worlds, most))] * 3
+        return Streams(Landed(container, nothing, nowhere), jnp.zeros((worlds, most), jnp.uint32))
 
     return jax.lax.cond(jnp.any(chosen), follow, none)
 
 
-def _beginnings(model: StateModel, view: PhysicsView) -> tuple[Float[Array, "W E 3"], Float[Array, "W E 2"]]:
-    """Where streams of each outlet begin (m, world), and the unit vector outwards (0 of a tap)."""
-    openings = of(model).containers.openings(view)
-    low, out = openings.lowest(), openings.outwards()
-    tap = jnp.asarray(view.link_pos)[:, _tap_links(model)]
-    return jnp.concatenate([low, tap], axis=1), jnp.concatenate([out, jnp.zeros(tap[..., :2].shape)], axis=1)
+def _of_chosen(chosen: Bool[Array, "W K E"], of_outlets: Float[Array, "W E"]) -> Float[Array, "W K"]:
+    """A number of the outlet of each stream; 0 where it has none of these."""
+    return jnp.sum(jnp.where(chosen, of_outlets[:, None], 0.0), axis=2)
 
 
 def _tap_links(model: StateModel) -> np.ndarray:
