@@ -22,6 +22,9 @@ from ig2mj.learn.progress import Window
 from ig2mj.learn.replay import Replay
 from ig2mj.learn.running_stats import RewardScale
 from ig2mj.learn.sac import SAC, SACConfig
+from ig2mj.learn.train import Run, train
+from ig2mj.process.compilation import XLA_EVENT
+from ig2mj.process.gc_pause import Compiled
 
 SMALL = {"actor_layers": (4,), "critic_layers": (4,), "num_atoms": 5, "batch_size": 8, "policy_delay": 1}
 SPACES = PointMass(1).observation_spaces
@@ -78,6 +81,32 @@ def test_homes_take_turns_and_fill_their_own_part_of_the_buffer():
     assert written[:4, :4].all() and written[:2, 4:].all() and not written[4:].any() and not written[2:, 4:].any()
     assert [s["steps"] for s in sums] == [8, 8, 8]  # two steps of the four worlds of one home
     assert [int(play.steps.max()) for play in plays] == [4, 2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("in_turn", [True, False])
+def test_all_programs_of_all_homes_are_compiled_together_before_the_first_starts(monkeypatch, in_turn):
+    class Awaiting(PointMass):
+        """Offers its start's program, as an environment does whose engine is loading kernels."""
+
+        def pending_programs(self, seed):
+            return [Compiled(self._start_fn).traced(jax.random.PRNGKey(seed))]
+
+    compiled, once = list[str](), list[list[str]]()
+
+    def note(event: str, duration_secs: float, **about: str | int) -> None:
+        if event == XLA_EVENT:
+            compiled.append(str(about.get("fun_name")))
+
+    env = Homes(4, 4)
+    env.envs = [Awaiting(4), Awaiting(4)]
+    for part in env.envs:
+        reset = part.reset
+        monkeypatch.setattr(part, "reset", lambda seed, reset=reset: (once.append(list(compiled)), reset(seed))[1])
+    jax.monitoring.register_event_duration_secs_listener(note)
+    train(env, sac(), Run(iterations=4, homes_in_turn=in_turn, quiet=True))
+    for name, count in (("jit(collect)", 2), ("jit(learn)", 1)):
+        assert once[0].count(name) == compiled.count(name) == count, "the calls find what was compiled"
 
 
 def test_homes_that_cannot_take_turns_are_stepped_together():

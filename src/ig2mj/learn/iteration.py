@@ -216,7 +216,8 @@ class SeveralHomes:
     def _programs(self, learner: Any, buffer: Any, key: Array, seed: int) -> Iterator[Traced]:
         rollouts = list[Any]()
         for k, part in enumerate(self._env.envs):
-            pending = part.pending_programs(self._env.seed_of(k, seed))
+            pending_programs = getattr(part, "pending_programs", None)
+            pending = [] if pending_programs is None else pending_programs(self._env.seed_of(k, seed))
             if not pending:  # the engine runs what is compiled when it is called
                 return
             play = started(pending[0].returned, self._algorithm.acting_state(part.num_worlds), part.num_worlds)

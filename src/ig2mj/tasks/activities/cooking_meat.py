@@ -7,10 +7,15 @@ counter onto the stove.
 
 from __future__ import annotations
 
+import dataclasses
+
+import jax.numpy as jnp
+
+from ig2mj.geometry.poses import length, quat_rotate_inverse
 from ig2mj.scene.tables import LinkKind
-from ig2mj.tasks.experts.motion import HandMotion, hand_motion, over, where
+from ig2mj.tasks.experts.motion import HandMotion, hand_motion, over, pointing, where
 from ig2mj.tasks.experts.pushing import draw
-from ig2mj.tasks.experts.reaching import take
+from ig2mj.tasks.experts.reaching import REACH, take
 from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import At, Hand, Heat
 from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Fit, Near, Task
@@ -23,6 +28,15 @@ ABOVE = 0.10
 CARRY = 0.05
 """m higher on the way."""
 
+HIGH, PITCH = 1.0, 0.7
+"""m above the floor from which on an arm takes the steak with a gripper that points outwards, and rad by which it then
+points down: a steeper one has its wrist at the height of wall cabinets, and its elbow at that of the counter."""
+
+TURNED, ASIDE, RAISED = 0.5, -0.3, 0.1
+"""rad of a turn that is still to be made above which the gripper would sweep a steak beyond `REACH`. It does not move
+sideways until then, and stays below wall cabinets. Where the steak lies on the arm's side, by so many m to the left of
+the robot's middle, the elbow would sweep it, and the gripper comes so many m higher instead."""
+
 
 def plan(see: ExpertView) -> list[HandMotion]:
     """One hand."""
@@ -30,7 +44,17 @@ def plan(see: ExpertView) -> list[HandMotion]:
         return [draw(see, MEAT, see.goal(Heat(STOVE)))]
     over_burner = see.goal(Heat(STOVE), ABOVE)
     carry = hand_motion(over(see.com(MEAT), over_burner, over_burner[:, 2] + CARRY), close=True)
-    return [where(see.holds(MEAT), carry, take(see, MEAT))]
+    if not see.on_arm:
+        return [where(see.holds(MEAT), carry, take(see, MEAT))]
+    offset = see.com(MEAT) - see.base_pos()
+    high = offset[:, 2] > HIGH
+    turn = jnp.where(high[:, None], pointing(see.hand_quat(), offset, PITCH), 0.0)
+    turns = (length(turn) > TURNED) & (length(offset[:, :2]) > REACH)
+    aside = quat_rotate_inverse(see.base_quat(), offset)[:, 1] < ASIDE
+    get = take(see, MEAT, above=RAISED * (turns & aside))
+    across = jnp.where((turns & ~aside)[:, None], 0.0, get.move[:, :2])
+    get = dataclasses.replace(get, move=get.move.at[:, :2].set(across))
+    return [dataclasses.replace(where(see.holds(MEAT), carry, get), turn=turn)]
 
 
 COOKING_MEAT = Task(

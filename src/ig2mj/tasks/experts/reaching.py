@@ -35,11 +35,12 @@ ASIDE = 0.8
 """rad that it may then point aside: turned wholly outwards over a low table, the elbow comes down onto its edge."""
 
 
-def take(see: ExpertView, name: str, hand: int = 0) -> HandMotion:
-    """From above onto the middle of an object, until it is touched."""
+def take(see: ExpertView, name: str, hand: int = 0, above: Float[Array, "W"] | float = 0.0) -> HandMotion:
+    """From above onto the middle of an object, until it is touched. `above`: m over it where the hand goes instead."""
     low, high = see.box(name)
     middle, top = 0.5 * (low + high), high[:, 2:]
-    return take_at(see, jnp.concatenate([middle[:, :2], jnp.maximum(top, middle[:, 2:] + BELOW)], axis=1), hand)
+    place = jnp.concatenate([middle[:, :2], jnp.maximum(top, middle[:, 2:] + BELOW)], axis=1)
+    return take_at(see, place.at[:, 2].add(above), hand)
 
 
 def take_at(see: ExpertView, place: Float[Array, "W 3"], hand: int = 0) -> HandMotion:
