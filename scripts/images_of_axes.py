@@ -63,9 +63,10 @@ def main(folder: pathlib.Path) -> None:
     keys, level = jax.random.split(jax.random.PRNGKey(0), WORLDS), jnp.linspace(0.0, 1.0, WORLDS)
     save("sensor_noise", np.asarray(noisy({"rgb": still}, env.observation_spaces, SensorNoise(), level, keys)["rgb"]))
     save("materials", shot(coloured(batch, fields), Draw()))
-    for axis in ("objects", "object_poses", "robot_start"):  # from one start state, but for the poses
+    # From one start state, but for the poses. Fetch looks down on the counter.
+    for axis, robot in {"objects": "fetch", "object_poses": "fetch", "robot_start": "humanoid"}.items():
         env = ig2mj.make(
-            "CookingMeat", "humanoid", WORLDS, "native", pool_size=8, observations="rgb", sensors=size, randomize=[axis]
+            "CookingMeat", robot, WORLDS, "native", pool_size=8, observations="rgb", sensors=size, randomize=[axis]
         )
         state = env.start_from(np.zeros(WORLDS, int), SEED)
         save(axis, np.asarray(state.obs["rgb"]))
