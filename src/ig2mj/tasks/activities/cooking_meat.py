@@ -53,7 +53,7 @@ def plan(see: ExpertView) -> list[HandMotion]:
     aside = quat_rotate_inverse(see.base_quat(), offset)[:, 1] < ASIDE
     get = take(see, MEAT, above=RAISED * (turns & aside))
     across = jnp.where((turns & ~aside)[:, None], 0.0, get.move[:, :2])
-    get = dataclasses.replace(get, move=get.move.at[:, :2].set(across))
+    get = dataclasses.replace(get, move=jnp.concatenate([across, get.move[:, 2:]], axis=1))
     return [dataclasses.replace(where(see.holds(MEAT), carry, get), turn=turn)]
 
 
