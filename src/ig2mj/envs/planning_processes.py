@@ -11,6 +11,7 @@ themselves, on the native engine, with one thread and without a GPU.
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import dataclasses
 import multiprocessing
@@ -59,6 +60,8 @@ class PlanningProcesses:
         self._queue: list[tuple[Any, ...]] = []
         self._processes: list[Any] = []
         self._pipes: list[multiprocessing.connection.Connection] = []
+        self._waiting = [collections.deque[tuple[Any, ...]]() for _ in range(processes)]  # requests by process
+        self._busy = [False] * processes
         if processes == 0:
             return
         config = dataclasses.replace(env.config, worlds=1, engine="native", engine_options={}, observations=())
@@ -92,8 +95,17 @@ class PlanningProcesses:
         self.asked.add(world)
         if self._here is not None:
             self._queue.append(request)
-        else:
-            self._pipes[world % len(self._pipes)].send(request)
+            return
+        number = world % len(self._pipes)
+        self._waiting[number].append(request)
+        self._send(number)
+
+    def _send(self, number: int) -> None:
+        """Sends a process its next request if it has answered all others: a pipe holds less than a request, and
+        writing to one that nobody reads blocks."""
+        if self._waiting[number] and not self._busy[number]:
+            self._busy[number] = True
+            self._pipes[number].send(self._waiting[number].popleft())
 
     def answers(self, wait: bool = False) -> Iterator[tuple[int, Answer | Ig2mjError]]:
         """Worlds and their answers that are there; an error of one of them is its answer.
@@ -110,14 +122,15 @@ class PlanningProcesses:
                 yield self._took(_answer(self._here, request))
             return
         ready = multiprocessing.connection.wait(self._pipes, None if wait and self.asked else 0.0)
-        for pipe in (p for p in self._pipes if p in ready):
-            while pipe.poll():
-                try:
-                    answer = pipe.recv()
-                except EOFError:
-                    words = "a process that plans has ended (is there enough memory for so many?)"
-                    raise EngineError(words) from None
-                yield self._took(answer)
+        for number in (k for k, p in enumerate(self._pipes) if p in ready):
+            try:
+                answer = self._pipes[number].recv()
+            except EOFError:
+                words = "a process that plans has ended (is there enough memory for so many?)"
+                raise EngineError(words) from None
+            self._busy[number] = False
+            self._send(number)
+            yield self._took(answer)
 
     def _took(self, answer: tuple[int, Any, float]) -> tuple[int, Answer | Ig2mjError]:
         world, found, seconds = answer

@@ -10,6 +10,7 @@ Axes: W worlds, J joints of the arm, N postures, P points of a way, T agent step
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import jax.numpy as jnp
@@ -41,11 +42,18 @@ from ig2mj.planning.clearance import HELD, Obstacles
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.scene.scene import Scene
 
+UP, FORWARDS = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+
 EVERY = 4
 """Agent steps between the postures of a way whose links are checked."""
 
 ASIDE = 0.6
 """m that a base would like to be from what its arm does; less than the arm's reach by half."""
+
+FETCH_TUCKED, FETCH_CARRY = (0.22, 0.12, 0.95), (0.42, 0.1, 1.15)
+"""m: grasp point of Fetch's empty hand at rest, pointing ahead, and of one that carries something; base's frame. So
+tucked, no link is farther from the axis than the base is; a hand that carries turns to where it takes hold, with its
+arm no farther to the sides."""
 
 
 class ArmBody(WheeledBody):
@@ -63,8 +71,14 @@ class ArmBody(WheeledBody):
         robot = scene.agents[agent]
         self.stands = float(robot.stands) if isinstance(robot, TaskRobot) else 0.0
         self.model, self._controller = model, controller
-        pos, quat = model.hand(model.rest[None])
-        self.rest, self.carry, self._rest_quat = pos, pos.copy(), quat[0]
+        self._grip, self.opening, self._spheres, self._corners = _gripper(
+            scene, agent, int(self.hands[0]), self.grips[0]
+        )
+        self._at_rest = self._tucked()
+        pos, quat = model.hand(self._at_rest[None])
+        self.rest, self._rest_quat = pos, quat[0]
+        tucks = isinstance(controller, FetchController)
+        self.carry = np.array([FETCH_CARRY]) if tucks else pos.copy()
         chain, first = model.chain, model.chain.upright()
         low, high = (np.where(chain.sliding, v, 0.0) for v in (chain.lower, chain.upper))
         start = chain.part(first + 1)
@@ -75,9 +89,27 @@ class ArmBody(WheeledBody):
         self.away = ASIDE * float(links)
         self._links = LinkSpheres(scene, agent, model)
         self.arm, self.trunk = self._links.bodies, self._links.trunk
-        self._grip, self.opening, self._spheres, self._corners = _gripper(
-            scene, agent, int(self.hands[0]), self.grips[0]
-        )
+        self._all_links = LinkSpheres(scene, agent, model, with_hand=True)
+
+    def _tucked(self) -> Float[np.ndarray, "J"]:
+        """The posture of the arm of an empty hand at rest."""
+        if not isinstance(self._controller, FetchController):
+            return self.model.rest
+        quat = np.array(self.turned(0, UP, FORWARDS))
+        found = self.model.follow(self.model.rest, np.array([FETCH_TUCKED]), quat[None])
+        return self.model.rest if found is None else found[-1]
+
+    def arm_spheres(self, joints: Float[np.ndarray, "J"], at_rest: bool) -> Float[np.ndarray, "S 4"]:
+        """See `HandedBody.arm_spheres`."""
+        return self._rest_spheres if at_rest else self._all_links.placed(self._posture(joints, False)[None])
+
+    @functools.cached_property
+    def _rest_spheres(self) -> Float[np.ndarray, "S 4"]:
+        return self._all_links.placed(self._at_rest[None])
+
+    def _posture(self, joints: Float[np.ndarray, "J"], at_rest: bool) -> Float[np.ndarray, "J"]:
+        """Of the arm. joints: of all robots, now."""
+        return np.asarray(self._at_rest if at_rest else joints[self.model.joints], float)
 
     def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
         action = np.zeros((len(senses.base_pos), self.size), np.float32)
@@ -175,11 +207,11 @@ class ArmBody(WheeledBody):
         obstacles: Obstacles,
     ) -> ArmFollower:
         """Whether the arm follows ways of its hand. joints: of all robots, now. base: position and direction."""
-        q = self.model.rest if at_rest else joints[self.model.joints]
-        return ArmFollower(self.model, self._links, np.asarray(q, float), base, np.asarray(quat, float), obstacles)
+        q = self._posture(joints, at_rest)
+        return ArmFollower(self.model, self._links, q, base, np.asarray(quat, float), obstacles)
 
 
-REST_LIMIT = 60
+REST_LIMIT = 80
 """Agent steps that an arm has for the way to where it rests."""
 
 SHIFT_TOLERANCE = 0.05

@@ -181,6 +181,11 @@ class HandedBody(Body, Protocol):
         """A program as this body carries it out."""
         ...
 
+    def arm_spheres(self, joints: Float[np.ndarray, "J"], at_rest: bool) -> Float[np.ndarray, "S 4"]:
+        """x, y, z in the frame of the base, and radius, of spheres that hold an arm and its hand, m; none of a hand
+        that floats. Arguments as of `follower`."""
+        ...
+
     def follower(
         self,
         joints: Float[np.ndarray, "J"],
@@ -334,6 +339,10 @@ class HoveringBody(_Body):
             else p
             for p in program
         ]
+
+    def arm_spheres(self, *_: Any) -> Float[np.ndarray, "S 4"]:
+        """None: the hands float."""
+        return np.zeros((0, 4))
 
     def follower(self, *_: Any) -> None:
         """None: the hands float."""

@@ -30,8 +30,21 @@ BESIDE = 0.6
 """m between a way and the middle of a door's leaf that it leads through, at most."""
 
 
-def through_doors(world: PlannedWorld, step: Step, action: Callable[[PlannedWorld, Step], Primitive]) -> Primitive:
-    """A primitive; where shut doors are in its way they are opened, and it begins again."""
+Action = Callable[[PlannedWorld, Step], Primitive]
+
+
+def through_doors(world: PlannedWorld, step: Step, action: Action) -> Primitive:
+    """A primitive; where shut doors are in its way they are opened, and it begins again. A base on wheels goes around
+    carpets, and over them where it fails otherwise."""
+    outcome = yield from _through_doors(world, step, action)
+    blocked = outcome.reason in ("no_base", "no_path", "timeout")
+    if not blocked or world.body.sideways or not world.planner.occupancy.covered.any():
+        return outcome
+    world.crosses = True
+    return (yield from _through_doors(world, step, action))
+
+
+def _through_doors(world: PlannedWorld, step: Step, action: Action) -> Primitive:
     outcome = yield from action(world, step)
     for _ in range(MOST_DOORS):
         door = door_in_the_way(world, step) if outcome.reason in ("no_base", "no_path") else None

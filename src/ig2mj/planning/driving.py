@@ -25,8 +25,8 @@ BACK = np.arange(0.0, 1.25, 0.1)
 NEAR = 1.0
 """m from the middle of an object at which a base without hands is near it."""
 
-BACKS_OFF = 0.3
-"""m that a base goes straight back where something has stopped it."""
+BACKS_OFF, RUN_UP = 0.3, 0.6
+"""m that a base goes straight back where something has stopped it; on wheels, to take an edge of a carpet."""
 
 SLIGHT = 0.02
 """m of stretching and stooping that do not count."""
@@ -48,13 +48,13 @@ AT_LEAST, SLOWEST = 100, 0.02
 
 
 def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
-    """Drives to a stance; returns the reason why it did not get there. A base that moves sideways and that something
-    has stopped backs off, and tries again, once."""
+    """Drives to a stance; returns the reason why it did not get there. A base that something has stopped backs
+    off, and tries again, once."""
     reason = yield from _go(world, stance)
-    if reason != "timeout" or not world.body.sideways:
+    if reason != "timeout":
         return reason
     here, yaw = world.base
-    x, y = here - BACKS_OFF * np.array([np.cos(yaw), np.sin(yaw)])
+    x, y = here - (BACKS_OFF if world.body.sideways else RUN_UP) * np.array([np.cos(yaw), np.sin(yaw)])
     yield [dataclasses.replace(shift(Stance((float(x), float(y)), yaw)), limit=20, after="")]
     return (yield from _go(world, stance))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import mujoco
 import numpy as np
@@ -35,9 +35,15 @@ class Disc:
 
 @dataclasses.dataclass(frozen=True)
 class BaseFootprint:
-    """See the module's text. Turning does not change it."""
+    """See the module's text. Turning does not change it.
+
+    Attributes:
+      discs: from the lowest on. wheels: m from the axis to which a base stands on wheels and casters that climb no edge
+        of a carpet; 0: it passes over what is lower than `LOWEST`.
+    """
 
     discs: tuple[Disc, ...]
+    wheels: float = 0.0
 
     @property
     def radius(self) -> float:
@@ -46,7 +52,15 @@ class BaseFootprint:
 
     def holding(self, low: float, high: float, radius: float) -> BaseFootprint:
         """With something between two heights that reaches `radius` from the axis, m."""
-        return BaseFootprint(_merged([*self.discs, Disc(max(low, LOWEST), high, radius)]))
+        return self.with_discs([Disc(max(low, LOWEST), high, radius)])
+
+    def with_discs(self, discs: Iterable[Disc]) -> BaseFootprint:
+        """With more discs."""
+        return dataclasses.replace(self, discs=_merged([*self.discs, *discs]))
+
+    def on_wheels(self) -> BaseFootprint:
+        """With wheels that reach as far as its lowest disc."""
+        return dataclasses.replace(self, wheels=self.discs[0].radius)
 
     @classmethod
     def of_robot(
@@ -79,23 +93,25 @@ class BaseFootprint:
         floor = float(axis[2]) - robot.stands if isinstance(robot, TaskRobot) else 0.0
         discs = []
         for k, geom in enumerate(geoms):
-            flat, tall = _extent(model, int(geom), frame[k])
+            away, tall = _extent(model, int(geom), frame[k], offset[k, :2])
             low, high = middle[k, 2] - tall - floor, middle[k, 2] + tall - floor
-            discs.append(Disc(float(low), float(high), float(np.linalg.norm(offset[k, :2]) + flat)))
+            discs.append(Disc(float(low), float(high), away))
         return cls(_merged(discs))
 
 
-def _extent(model: mujoco.MjModel, geom: int, frame: np.ndarray) -> tuple[float, float]:
-    """Half extents of a geom about its middle: horizontal, from the vertical axis, and vertical, m."""
+def _extent(model: mujoco.MjModel, geom: int, frame: np.ndarray, offset: np.ndarray) -> tuple[float, float]:
+    """How far a geom reaches from the robot's vertical axis, and from its middle upwards, m. `offset`: of the middle
+    from the axis, horizontal."""
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     if kind == int(mujoco.mjtGeom.mjGEOM_SPHERE):
-        return float(size[0]), float(size[0])
+        return float(np.hypot(*offset) + size[0]), float(size[0])
     if kind in (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)):
         along, round_ = frame[:, 2] * size[1], float(size[0])
-        return float(np.hypot(*along[:2])) + round_, abs(float(along[2])) + round_
+        ends = offset + np.array([[1.0], [-1.0]]) * along[:2]
+        return float(np.linalg.norm(ends, axis=1).max()) + round_, abs(float(along[2])) + round_
     box = model.geom_aabb[geom]
     corners = (frame @ (np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1) * box[3:, None] + box[:3, None])).T
-    return float(np.linalg.norm(corners[:, :2], axis=1).max()), float(np.abs(corners[:, 2]).max())
+    return float(np.linalg.norm(corners[:, :2] + offset, axis=1).max()), float(np.abs(corners[:, 2]).max())
 
 
 def _merged(discs: list[Disc]) -> tuple[Disc, ...]:

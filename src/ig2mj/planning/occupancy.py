@@ -57,6 +57,7 @@ class Occupancy:
         owner = tables.piece_object
         self._solid = (owner >= 0) & ~ground[owner]
         self._floor = (owner >= 0) & tables.object_is_floor[owner]
+        self._covering = (owner >= 0) & ground[owner] & ~self._floor
         moving = scene.model.body_weldid[tables.piece_body] != 0
         self._still = self._solid & ~moving
         self._moving = np.flatnonzero(self._solid & moving)
@@ -72,7 +73,7 @@ class Occupancy:
         }
         start = scene.start_data()
         rotation = np.array(start.xmat).reshape(-1, 3, 3)
-        still = np.flatnonzero(self._still | self._floor)
+        still = np.flatnonzero(self._still | self._floor | self._covering)
         self._placed_still = dict(zip(still.tolist(), self._placed(still, np.array(start.xpos), rotation), strict=True))
         bounds = np.concatenate([v for v in self._placed_still.values()] or [np.zeros((1, 3))])
         inside = np.concatenate([self._placed_still[k] for k in np.flatnonzero(self._floor).tolist()] or [bounds])
@@ -97,6 +98,14 @@ class Occupancy:
         found = np.zeros(self.shape, bool)
         for vertices in pieces:
             self._draw(found, vertices[:, :2], SEAM)
+        return found
+
+    @functools.cached_property
+    def covered(self) -> Bool[np.ndarray, "h w"]:
+        """Cells that carpets, mats and rugs cover, where the home has them."""
+        found = np.zeros(self.shape, bool)
+        for piece in np.flatnonzero(self._covering).tolist():
+            self._draw(found, self._placed_still[piece][:, :2])
         return found
 
     def _taken_by_still(self, low: float, high: float) -> Bool[np.ndarray, "h w"]:
@@ -158,6 +167,8 @@ class Occupancy:
         for disc in footprint.discs:
             taken = self.taken(view, disc.low, disc.high, without, world)
             spare = np.minimum(spare, self._distance_to(taken) - disc.radius - CLEARANCE)
+        if footprint.wheels and self.covered.any():
+            spare = np.minimum(spare, self._distance_to(self.covered) - footprint.wheels)
         return (spare >= 0) & self.floor, spare
 
     def _distance_to(self, taken: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:

@@ -17,7 +17,7 @@ from ig2mj.planning.bodies import ALONG, Follower, HandedBody, Senses, grip_of, 
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
-from ig2mj.planning.footprint import BaseFootprint
+from ig2mj.planning.footprint import BaseFootprint, Disc
 from ig2mj.planning.free_floor import FreeFloor
 from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.stage import Stage
@@ -70,7 +70,8 @@ class PlannedWorld:
 
     Attributes:
       stage, body, domain, planner: of all worlds. query: a world of the scene on the native engine, to sample spots in.
-      world: number. rng: of this primitive.
+      world: number. rng: of this primitive. crosses: a base on wheels drives over edges of carpets, at which it may get
+        stuck.
     """
 
     stage: Stage
@@ -80,6 +81,7 @@ class PlannedWorld:
     query: SceneQuery
     world: int
     rng: np.random.Generator
+    crosses: bool = False
     _points: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
     _sensed: tuple[PhysicsView, Senses] | None = dataclasses.field(default=None, init=False)
 
@@ -235,8 +237,15 @@ class PlannedWorld:
         view, number, hands = self.view, self.world, self.body.hands
         held = [n if n and not self.domain.fixed(n) else "" for n in self.held]
         counts = hands.tolist() if isinstance(self.body, HandedBody) else []
-        arm = [] if not counts or holding else self.body.arm.tolist()
+        arm = self.body.arm.tolist() if counts else []
         footprint = BaseFootprint.of_robot(self.stage.scene, view, self.stage.agent, number, counts, arm)
+        if counts and (holding or not any(held)):
+            row = np.zeros(0) if self.senses.joints is None else self.senses.joints[number].astype(float)
+            spheres = self.body.arm_spheres(row, at_rest=not any(held))
+            aside = np.abs(spheres[:, 1]) if ahead else np.linalg.norm(spheres[:, :2], axis=1)
+            middle = self.body.stands + spheres[:, 2]
+            bottom, top = middle - spheres[:, 3], middle + spheres[:, 3]
+            footprint = footprint.with_discs(map(Disc, bottom, top, aside + spheres[:, 3]))
         if counts and not all(held) and self.body.resting is not None:
             footprint = footprint.holding(*(self.body.resting if reaching else TUCKED))
         here, yaw = self.base
@@ -249,6 +258,8 @@ class PlannedWorld:
                 offset = corners[:, :2] - here
                 away = float((np.abs(offset @ aside) if ahead else np.linalg.norm(offset, axis=1)).max())
                 footprint = footprint.holding(float(corners[:, 2].min()), float(corners[:, 2].max()), away)
+        if not self.body.sideways and not self.crosses:
+            footprint = footprint.on_wheels()
         return self.planner.floor(view, footprint, without=[self.index(n) for n in held if n], world=number)
 
     def away(self, spheres: Float[np.ndarray, "S 4"]) -> float:
