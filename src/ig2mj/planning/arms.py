@@ -246,9 +246,16 @@ class ArmFollower:
 
     def __call__(self, points: Sequence[np.ndarray]) -> bool:
         """Whether the hand gets along points of the world from where it is, and the links have room."""
-        own = self._own(np.array(points))
-        found = self._model.follow(self._q, own, np.tile(self._quat, (len(own), 1)))
+        found = self._followed(points)
         return found is not None and self._clear(np.concatenate([found[EVERY::EVERY], found[-1:]]))
+
+    def passes(self, points: Sequence[np.ndarray]) -> bool:
+        """See `Follower.passes`."""
+        return self._followed(points) is not None
+
+    def _followed(self, points: Sequence[np.ndarray]) -> Float[np.ndarray, "T J"] | None:
+        own = self._own(np.array(points))
+        return self._model.follow(self._q, own, np.tile(self._quat, (len(own), 1)))
 
     def _clear(self, joints: np.ndarray) -> bool:
         spheres = self._links.placed(joints)

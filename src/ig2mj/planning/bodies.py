@@ -128,7 +128,11 @@ class Follower(Protocol):
         ...
 
     def __call__(self, points: Sequence[np.ndarray]) -> bool:
-        """Whether it goes along points of the world, m, the first of which is not where it is."""
+        """Whether it goes along points of the world, m, the first of which is not where it is, with room for it."""
+        ...
+
+    def passes(self, points: Sequence[np.ndarray]) -> bool:
+        """As a call, whatever is in the way: what the hand moves along is there, too."""
         ...
 
 

@@ -75,6 +75,10 @@ EMPTY, FULL = (0.04, 0.05), (0.004, 0.015)
 """m in an agent step of a hand that pulls, and m within which it has reached a place on the way: of what is empty, and
 of a drawer with things in it. A hand moves in jerks, one in each agent step, under which things slide to the back."""
 
+ARM_SWING, ARM_MOVES = 0.35, 14
+"""Share of a joint's range by which an arm moves it from one stance, at most: a floating hand follows a door farther;
+and such moves for one primitive."""
+
 STANCES, WAYS = 20, 12
 """Stances for each grip, and ways of a hand that are looked for with one kind of grip, at most."""
 
@@ -85,7 +89,8 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
     def set_open(world: PlannedWorld, step: Step) -> Primitive:
         name, reason, detail = step.object, "no_grasp", ""
         passed, nowhere = dict[str, int](), 0
-        for attempt in range(2 * ATTEMPTS):
+        moves = 2 * ATTEMPTS if world.body.opening is None else ARM_MOVES
+        for attempt in range(moves):
             if world.facts.holds("open", name) == value:
                 return Outcome(attempts=max(attempt, 1))
             joints = [j for j in joints_of(world, name) if value or j.fraction > SHUT]
@@ -100,8 +105,8 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             now = {j.name: j.fraction for j in joints_of(world, name)}
             passed[joint.name] = tried + (_progress(joint, now, value) < MOVED)
         if world.facts.holds("open", name) == value:
-            return Outcome(attempts=2 * ATTEMPTS)
-        return Outcome(reason or "not_true_after", detail, attempts=2 * ATTEMPTS)
+            return Outcome(attempts=moves)
+        return Outcome(reason or "not_true_after", detail, attempts=moves)
 
     return set_open
 
@@ -246,8 +251,9 @@ def _plan(
     world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int, to: float = OPEN_TO
 ) -> _JointPlan | None:
     floor, obstacles = world.floor(), world.obstacles()
-    passed = 0
-    for grips, fraction, pulls in _ways(world, joint, value, to):
+    passed, step = 0, 1.0 if world.body.opening is None else ARM_SWING
+    for grips, end, pulls in _ways(world, joint, value, to):
+        fraction = min(end, joint.fraction + step) if value else max(end, joint.fraction - step)
         count, sweep = 0, joint.sweep(fraction)[:, :2]
         for grip in grips:
             places = joint.path(grip, fraction)
@@ -268,7 +274,8 @@ def _plan(
                 back = [-ahead(stance.yaw), normal, UP]
                 quat = world.body.turned(hand, _fingers(joint, places[0], pulls, hand), -normal)
                 follows = world.follows(hand, quat, obstacles, stance)
-                if hand_path(obstacles, spheres, world.resting(hand, stance), before, back, follows=follows) is None:
+                way = hand_path(obstacles, spheres, world.resting(hand, stance), before, back, follows=follows)
+                if way is None or (follows is not None and not follows.passes([*way, *(p for p, _ in places)])):
                     continue
                 passed += 1
                 if passed > tried:
