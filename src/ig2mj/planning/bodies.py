@@ -50,6 +50,10 @@ RADIUS, CORNER, BEHIND, ALONG = 0.03, 0.03, 0.014, (0.07, 0.1)
 """m: of the spheres of a floating hand: radius; of the palm's corners from its middle, along the fingers and across; of
 the palm behind the grasp point; of the fingers ahead of it."""
 
+RUSH, RUSHING = 0.2, 3.0
+"""m in an agent step from which on a wheeled base drives as fast as it can, to take an edge of a carpet, and by how
+much its gain is greater then."""
+
 _BODY = tuple(f"body_{n}" for n in ("x", "y", "z", "roll", "pitch", "yaw"))
 
 QUICK = 0.08
@@ -247,7 +251,8 @@ class WheeledBody(_Body):
         acts = rows["base"] != Base.STAY
         action[:, turn] = np.where(acts, np.clip(GAIN * left, -MOST, MOST), 0.0)
         ahead = drives & (np.abs(left) < AHEAD)
-        speed = np.clip(GAIN * apart, 0.0, MOST) * np.cos(left)
+        rushes = rows["speed"] >= RUSH
+        speed = np.clip(np.where(rushes, RUSHING, 1.0) * GAIN * apart, 0.0, np.where(rushes, 1.0, MOST)) * np.cos(left)
         action[:, forward] = np.where(ahead, np.where(back, -speed, speed), 0.0)
         return action
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator
 
 import numpy as np
 
-from ig2mj.planning.bodies import HandedBody, HoveringBody
+from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.clutter import moved_out_of_the_way, nearest_floor, target_of
 from ig2mj.planning.driving import NEAR
 from ig2mj.planning.moves import Primitive, Program, free_hand
@@ -62,7 +62,7 @@ def _through_doors(world: PlannedWorld, step: Step, action: Action) -> Primitive
 def _swing(world: PlannedWorld, door: str, step: Step) -> Generator[Program, str, str | None]:
     """Opens a door by short swings, each from a new stance, until it is in the way no longer. None, or why it still is,
     in words; "" for a robot that opens no doors."""
-    if not isinstance(world.body, HoveringBody):
+    if not isinstance(world.body, HandedBody):
         return ""
     if all(world.held):
         return f", and the hands are full: {', '.join(world.held)}"

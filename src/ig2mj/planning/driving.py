@@ -11,6 +11,7 @@ from collections.abc import Generator
 
 import numpy as np
 
+from ig2mj.planning.bodies import RUSH
 from ig2mj.planning.carrying import carried_way
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.moves import UP, Program, go_home, strayed, vector3
@@ -78,7 +79,8 @@ def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
         way, before = world.floor(reaching=True).way(here, stance.xy), list[Phase]()
         if way is None:
             way, before = standing.way(here, stance.xy), tuck(world)
-        return "no_path" if way is None else (yield [*before, *drive(way, stance.yaw, QUICK), *last])
+        speed = RUSH if world.crosses else QUICK
+        return "no_path" if way is None else (yield [*before, *drive(way, stance.yaw, speed), *last])
     if tucked := tuck(world):
         yield tucked
     aside = abs(float(np.array([-np.sin(yaw), np.cos(yaw)]) @ np.subtract(stance.xy, here)))
@@ -99,10 +101,11 @@ def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     if way is None:  # what is held may touch something where the way turns
         way = world.floor(holding=True, ahead=True).way(here, stance.xy)
         way = standing.way(here, stance.xy) if way is None else way
-        return "no_path" if way is None else (yield [*_keeping(world, drive(way, stance.yaw)), *last])
+        program = drive(way, stance.yaw, RUSH if world.crosses else None) if way is not None else []
+        return "no_path" if way is None else (yield [*_keeping(world, program), *last])
     assert start is not None and end is not None
     program = [] if start.xy == (here[0], here[1]) else [shift(start)]
-    program += drive(way, stance.yaw)
+    program += drive(way, stance.yaw, RUSH if world.crosses else None)
     return (yield [*_keeping(world, [*program, *([] if end.xy == stance.xy else [shift(stance)])]), *last])
 
 
