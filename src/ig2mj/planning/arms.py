@@ -5,7 +5,7 @@ the arm's inverse kinematics for a small displacement. `ArmModel` knows what the
 hand can be followed without physics (`ArmModel.follow`): a way counts where the arm gets to its end, and where none of
 its links meets anything. Inverse kinematics begin at several postures (`ArmModel.solve`).
 
-Axes: W worlds, J joints of the arm, N postures, P points of a way, T agent steps.
+Axes: W worlds, Q joints of all robots, J joints of the arm, N postures, P points of a way, T agent steps.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class ArmBody(WheeledBody):
         found = self.model.follow(self.model.rest, np.array([FETCH_TUCKED]), quat[None])
         return self.model.rest if found is None else found[-1]
 
-    def arm_spheres(self, joints: Float[np.ndarray, "J"], at_rest: bool) -> Float[np.ndarray, "S 4"]:
+    def arm_spheres(self, joints: Float[np.ndarray, "Q"], at_rest: bool) -> Float[np.ndarray, "S 4"]:
         """See `HandedBody.arm_spheres`."""
         return self._rest_spheres if at_rest else self._all_links.placed(self._posture(joints, False)[None])
 
@@ -107,7 +107,7 @@ class ArmBody(WheeledBody):
     def _rest_spheres(self) -> Float[np.ndarray, "S 4"]:
         return self._all_links.placed(self._at_rest[None])
 
-    def _posture(self, joints: Float[np.ndarray, "J"], at_rest: bool) -> Float[np.ndarray, "J"]:
+    def _posture(self, joints: Float[np.ndarray, "Q"], at_rest: bool) -> Float[np.ndarray, "J"]:
         """Of the arm. joints: of all robots, now."""
         return np.asarray(self._at_rest if at_rest else joints[self.model.joints], float)
 
@@ -200,7 +200,7 @@ class ArmBody(WheeledBody):
 
     def follower(
         self,
-        joints: Float[np.ndarray, "J"],
+        joints: Float[np.ndarray, "Q"],
         at_rest: bool,
         base: tuple[Float[np.ndarray, "3"], float],
         quat: Sequence[float] | np.ndarray,

@@ -2,7 +2,7 @@
 
 `command` gives numbers of the controller's action in its own units. All of it is pure and batched.
 
-Axes: W worlds, n numbers of a robot's action, H hands of the robot.
+Axes: W worlds, n numbers of a robot's action, H hands of the robot, Q joints of all robots.
 """
 
 from __future__ import annotations
@@ -189,14 +189,14 @@ class HandedBody(Body, Protocol):
         """A program as this body carries it out."""
         ...
 
-    def arm_spheres(self, joints: Float[np.ndarray, "J"], at_rest: bool) -> Float[np.ndarray, "S 4"]:
+    def arm_spheres(self, joints: Float[np.ndarray, "Q"], at_rest: bool) -> Float[np.ndarray, "S 4"]:
         """x, y, z in the frame of the base, and radius, of spheres that hold an arm and its hand, m; none of a hand
         that floats. Arguments as of `follower`."""
         ...
 
     def follower(
         self,
-        joints: Float[np.ndarray, "J"],
+        joints: Float[np.ndarray, "Q"],
         at_rest: bool,
         base: tuple[Float[np.ndarray, "3"], float],
         quat: Sequence[float] | np.ndarray,
