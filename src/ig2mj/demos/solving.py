@@ -24,6 +24,8 @@ from ig2mj.demos.environments import RecordedEnvironment, record
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.planning_stage import EnvironmentStage, problem_env
 from ig2mj.errors import EngineError
+from ig2mj.planning.body_kinds import body_of
+from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.physics import PhysicsRung, check_robot
 from ig2mj.planning.problem import Problem
 from ig2mj.planning.results import row_of
@@ -126,6 +128,7 @@ class Episodes:
           begun: called where episodes begin, with their numbers and what carries out their steps.
         """
         query, count = SceneQuery(self.env.scene), self.env.num_worlds
+        motion, body = MotionPlanner(self.env.scene), body_of(self.env.scene, self.stage.controller)
         for first in range(0, len(self.numbers), count):
             chosen = self.numbers[first : first + count]
             padded = [*chosen, *[chosen[0]] * (count - len(chosen))]
@@ -133,7 +136,7 @@ class Episodes:
             self.stage.start(rows, self.problem.named if self._open else None)
             if self._recorded is not None:
                 self._recorded.begin_runs(self.stage.state, rows, range(len(chosen)))
-            rung = PhysicsRung(self.stage, self._seed, padded, query)
+            rung = PhysicsRung(self.stage, self._seed, padded, query, motion, body)
             begun(chosen, rung)
             ended = lambda world, result, chosen=chosen: self._ended(world, chosen[world], result)  # noqa: E731
             results = solve(self.planner, rung, seconds=seconds, watch=watch, worlds=range(len(chosen)), ended=ended)

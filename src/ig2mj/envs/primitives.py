@@ -159,7 +159,8 @@ class PrimitiveEnv(gymnasium.Env):
             ((_, self._rung),) = symbolic_episodes(self.domain, self.problem.scene, self._pool, [row], stream)
         else:
             self._stage.start(np.array([0 if self._pool is None else row]), self.problem.named)
-            self._rung = PhysicsRung(self._stage, stream, row, self._query)
+            body = self._rung.body if isinstance(self._rung, PhysicsRung) else None
+            self._rung = PhysicsRung(self._stage, stream, row, self._query, body=body)
         facts = self.facts
         self._start = facts.truth(self.problem.goal.atoms)
         self._count, self._q = 0, 0.0

@@ -22,6 +22,7 @@ import numpy as np
 from ig2mj.agents.base import Controller
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
+from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.moves import Program
 from ig2mj.planning.physics import PhysicsRung
@@ -102,6 +103,7 @@ class PlanningAway:
         """
         self._stage = LoadedStage(scene, model, initial)
         self._query, self._motion = SceneQuery(scene), MotionPlanner(scene)
+        self._body = body_of(scene, self._stage.controller, self._stage.agent)  # of an arm, it is compiled once
         self._goal, self._seed = goal, seed
         self._worlds: dict[int, tuple[PhysicsRung, Solving]] = {}
         self._results: dict[int, EpisodeResult] = {}
@@ -113,7 +115,7 @@ class PlanningAway:
           PlanningError: the goal cannot become true.
         """
         self._stage.load(copy)
-        rung = PhysicsRung(self._stage, self._seed, [number], self._query, self._motion)
+        rung = PhysicsRung(self._stage, self._seed, [number], self._query, self._motion, self._body)
         self._results.pop(world, None)
         planner = TaskPlanner(rung.domain, self._goal)
         ended = lambda _, result, world=world: self._results.__setitem__(world, result)  # noqa: E731

@@ -18,7 +18,7 @@ from ig2mj.agents.humanoid.robot import Humanoid
 from ig2mj.agents.registry import find_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.planning import execution
-from ig2mj.planning.bodies import HandedBody
+from ig2mj.planning.bodies import Body, HandedBody
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
@@ -61,18 +61,20 @@ class PhysicsRung:
         first: int | Sequence[int] = 0,
         query: SceneQuery | None = None,
         planner: MotionPlanner | None = None,
+        body: Body | None = None,
     ):
         """
         Args:
           seed, first: of random streams: a stream belongs to (seed, number, number of the step). The number of a world
             is first + world, or first[world].
-          query, planner: a world of the stage's scene to sample spots in, and what plans ways there; None: new ones.
+          query, planner, body: a world of the stage's scene to sample spots in, what plans ways there, and how programs
+            move the robot; None: new ones.
 
         Raises:
           PlanningError: the robot has no base that planned ways can move.
         """
-        self.stage, self.body = stage, body_of(stage.scene, stage.controller, stage.agent)
-        body = self.body
+        body = body or body_of(stage.scene, stage.controller, stage.agent)
+        self.stage, self.body = stage, body
         self.domain = Domain(stage.model, len(body.hands))
         self._planner = planner or MotionPlanner(stage.scene, stage.agent)
         self._query = query
