@@ -98,7 +98,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 if again is None or not again.done:
                     return Outcome("slipped", f"the hand lost {tool}", attempts=attempt + 1)
             hand = hand_with(world, tool)
-            if is_covered(world, tool, hand):
+            if world.body.opening is None and is_covered(world, tool, hand):  # a gripper holds a tool by its edge
                 yield from put_down_others(world, tool)
                 if failed := (yield from hand_over(world, tool, hand)):
                     reason, detail = failed, f"{tool} cannot be taken by the side that does not clean"

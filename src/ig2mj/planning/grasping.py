@@ -54,6 +54,9 @@ CLEARLY = 0.05
 MOVED = 0.03
 """m that an object has moved beyond which its grasp is planned again."""
 
+ARM_ATTEMPTS = 8
+"""Tries of a gripper, whose fingers have to come below or around what a palm only touches."""
+
 POSES, WAYS = 6, 120
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
 
@@ -75,12 +78,12 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
     if not is_graspable(world, name):
         return Outcome("no_grasp", f"{name} is fixed, or its category allows no assisted grasp")
     reason, detail, tried, moved = "no_grasp", "", list[GraspPose](), Tried()
-    nowhere = 0
-    for attempt in range(ATTEMPTS):
+    nowhere, attempts = 0, ATTEMPTS if world.body.opening is None else ARM_ATTEMPTS
+    for attempt in range(attempts):
         if nowhere and nowhere >= world.held.count(""):  # no hand finds a way
             break
         hand = free_hand(world, attempt)
-        if prefers is None and name in world.domain.tools:
+        if prefers is None and name in world.domain.tools and world.body.opening is None:
             prefers = functools.partial(_leaves_free, world, name)
         found = _plan(world, name, hand, tried, prefers)
         while found is None and (yield from open_around(world, name, moved)):
@@ -93,6 +96,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         (stance, pose), before = found, world.com(name)
         if reason := (yield from go(world, stance)):
             detail = f"no path leads to where a hand reaches {name}"
+            tried.append(pose)
             continue
         if np.linalg.norm(world.com(name) - before) > MOVED:
             reason, detail = "no_grasp", f"{name} was moved while the robot went there"
@@ -101,7 +105,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         reason, detail = yield from _take(world, name, hand, pose)
         if name in world.held:
             return Outcome(attempts=attempt + 1)
-    return Outcome(reason or "no_grasp", detail, attempts=ATTEMPTS)
+    return Outcome(reason or "no_grasp", detail, attempts=attempts)
 
 
 def _leaves_free(world: PlannedWorld, name: str, pose: GraspPose) -> float:
