@@ -34,7 +34,8 @@ def planning_of(env: Environment, seed: int = 0) -> PlanningAway:
     rules = env.core.rules
     if rules is None or rules.goal is None:
         raise EngineError(f"{env.task.name} has no goal to plan for")
-    return PlanningAway(env.scene, rules.model, rules.initial, rules.goal, seed)
+    friction = env.core.grasping is None
+    return PlanningAway(env.scene, rules.model, rules.initial, rules.goal, seed, friction)
 
 
 class PlanningProcesses:

@@ -80,6 +80,10 @@ class EnvironmentStage:
         return self.env.num_worlds
 
     @property
+    def by_friction(self) -> bool:
+        return self.env.core.grasping is None
+
+    @property
     def view(self) -> PhysicsView:
         return self.state.batch.world.view
 

@@ -56,8 +56,9 @@ class LoadedStage:
 
     agent, num_worlds = 0, 1
 
-    def __init__(self, scene: Scene, model: StateModel, initial: ExtendedStates):
-        """`scene`: with its robots. `model`, `initial`: of its states."""
+    def __init__(self, scene: Scene, model: StateModel, initial: ExtendedStates, by_friction: bool = False):
+        """`scene`: with its robots. `model`, `initial`: of its states. `by_friction`: see `Stage`."""
+        self.by_friction = by_friction
         self.scene, self.model = scene, model
         robot: Any = scene.agents[0]
         self.controller: Controller = robot.controller(scene.tables, 0)
@@ -94,14 +95,20 @@ class PlanningAway:
     """See the module's text. It keeps the plan and the primitive of every world for which `begin` was called."""
 
     def __init__(
-        self, scene: Scene, model: StateModel, initial: ExtendedStates, goal: CompiledExpression, seed: int = 0
+        self,
+        scene: Scene,
+        model: StateModel,
+        initial: ExtendedStates,
+        goal: CompiledExpression,
+        seed: int = 0,
+        by_friction: bool = False,
     ):
         """
         Args:
           scene: with the robot. model, initial: of its states, initial ones with a world axis. goal: compiled for it.
-          seed: of random streams.
+          seed: of random streams. by_friction: see `Stage`.
         """
-        self._stage = LoadedStage(scene, model, initial)
+        self._stage = LoadedStage(scene, model, initial, by_friction)
         self._query, self._motion = SceneQuery(scene), MotionPlanner(scene)
         self._body = body_of(scene, self._stage.controller, self._stage.agent)  # of an arm, it is compiled once
         self._goal, self._seed = goal, seed

@@ -32,6 +32,7 @@ from ig2mj.geometry.host_rotations import (
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.phases import Base, Phase, Until
 from ig2mj.scene.scene import Scene
+from ig2mj.scene.tables import SceneTables
 
 AHEAD = 0.35
 """rad of a base's direction from that of the way within which it drives; else it turns first."""
@@ -53,6 +54,9 @@ the palm behind the grasp point; of the fingers ahead of it."""
 RUSH, RUSHING = 0.2, 3.0
 """m in an agent step from which on a wheeled base drives as fast as it can, to take an edge of a carpet, and by how
 much its gain is greater then."""
+
+PRESSED, PRESSING = 0.2, 2
+"""N with which a finger's link presses on what it holds, at least, and links that hold something by friction alone."""
 
 _BODY = tuple(f"body_{n}" for n in ("x", "y", "z", "roll", "pitch", "yaw"))
 
@@ -82,15 +86,27 @@ class Senses:
         return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def sense(view: PhysicsView, agent: int, hands: Int[np.ndarray, "H"]) -> Senses:
-    """What the view says of one robot."""
+class FrictionHolds:
+    """What hands hold by friction alone, where no constraint says so: what two links of a hand's fingers press on."""
+
+    def __init__(self, tables: SceneTables, hands: Int[np.ndarray, "H"]):
+        self._links = (tables.finger_hand[None] == hands[:, None]).astype(np.int32)
+        self._bodies = (tables.graspable_object[:, None] == np.arange(tables.num_objects)).astype(np.int32)
+
+    def __call__(self, view: PhysicsView) -> Bool[np.ndarray, "W H O"]:
+        pressed = (np.asarray(view.agent.finger_force) > PRESSED).astype(np.int32)
+        return (np.einsum("hf,wfy->why", self._links, pressed) >= PRESSING).astype(np.int32) @ self._bodies > 0
+
+
+def sense(view: PhysicsView, agent: int, hands: Int[np.ndarray, "H"], friction: FrictionHolds | None = None) -> Senses:
+    """What the view says of one robot. friction: its hands hold by friction alone; None: by constraints."""
     a = view.agent
     return Senses(
         base_pos=np.asarray(a.base_pos)[:, agent],
         base_quat=np.asarray(a.base_quat)[:, agent],
         hand_pos=np.asarray(a.hand_pos)[:, hands],
         hand_quat=np.asarray(a.hand_quat)[:, hands],
-        held=np.asarray(view.held)[:, hands],
+        held=np.asarray(view.held)[:, hands] if friction is None else friction(view),
         touching=np.asarray(a.touching)[:, agent],
         joints=np.asarray(a.joint_pos),
     )
@@ -107,12 +123,13 @@ class Body(Protocol):
     """A robot as programs move it.
 
     Attributes:
-      size: n. hands: numbers of its hands among all hands of the scene. grips: [H, 3] m, the point with which each hand
-        takes hold, in its frame. sideways: its base moves in any direction. stands: m, height of a body that hovers;
-        else 0.
+      size: n. friction: what its hands hold by friction alone; None: they hold by constraints. hands: numbers of its
+        hands among all hands of the scene. grips: [H, 3] m, the point with which each hand takes hold, in its frame.
+      sideways: its base moves in any direction. stands: m, height of a body that hovers; else 0.
     """
 
     size: int
+    friction: FrictionHolds | None
     hands: Int[np.ndarray, "H"]
     grips: Float[np.ndarray, "H 3"]
     sideways: bool
@@ -213,6 +230,7 @@ class HandedBody(Body, Protocol):
 
 class _Body:
     stands = 0.0
+    friction: FrictionHolds | None = None
 
     def __init__(self, scene: Scene, controller: Controller, agent: int):
         robot = scene.agents[agent]

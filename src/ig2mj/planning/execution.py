@@ -90,7 +90,7 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     Args:
       view: of the present physics. Worlds whose programs have ended get an action that leaves everything as it is.
     """
-    senses = sense(view, agent, body.hands)
+    senses = sense(view, agent, body.hands, body.friction)
     rows = carry.rows
     there, lost = _ended(body, senses, rows), _lost(senses, rows)
     still = np.where(_hand_is_still(carry, senses, rows), carry.still + 1, 0)

@@ -57,6 +57,9 @@ MOVED = 0.03
 ARM_ATTEMPTS = 8
 """Tries of a gripper, whose fingers have to come below or around what a palm only touches."""
 
+FIRM = 8
+"""Agent steps in which fingers close firmly on what they hold by friction alone."""
+
 POSES, WAYS = 6, 120
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
 
@@ -134,6 +137,7 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
               speed=TOUCHING if floats else COMING),
         Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15, after="no_grasp",
               speed=CLOSING if floats else GRIPPING),
+        *([Phase(hand=hand, pos=deep, close=True, until=Until.WAITED, limit=FIRM)] if world.body.friction else []),
         *([Phase(hand=hand, pos=vector3(pose.at(0.0) + lift), keeps=index, close=True, tolerance=0.02, limit=10,
                  after="", speed=0.03)] if lift.any() else []),
         Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=True, tolerance=0.04, limit=30, after="",

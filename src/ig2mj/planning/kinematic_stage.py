@@ -38,6 +38,8 @@ class KinematicStage:
         self._start = self._query.save()
         self._states: ExtendedStates | None = None
 
+    by_friction = False
+
     @property
     def view(self) -> PhysicsView:
         return self._query.view

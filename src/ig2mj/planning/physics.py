@@ -18,7 +18,7 @@ from ig2mj.agents.humanoid.robot import Humanoid
 from ig2mj.agents.registry import find_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.planning import execution
-from ig2mj.planning.bodies import Body, HandedBody
+from ig2mj.planning.bodies import Body, FrictionHolds, HandedBody
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
@@ -75,6 +75,7 @@ class PhysicsRung:
         """
         body = body or body_of(stage.scene, stage.controller, stage.agent)
         self.stage, self.body = stage, body
+        body.friction = FrictionHolds(stage.scene.tables, body.hands) if stage.by_friction else None
         self.domain = Domain(stage.model, len(body.hands))
         self._planner = planner or MotionPlanner(stage.scene, stage.agent)
         self._query = query

@@ -49,6 +49,11 @@ class Stage(Protocol):
     def num_worlds(self) -> int: ...
 
     @property
+    def by_friction(self) -> bool:
+        """Whether hands hold by friction alone, so that no constraint says what they hold."""
+        ...
+
+    @property
     def view(self) -> PhysicsView:
         """Of the present physics."""
         ...
@@ -110,6 +115,10 @@ class CoreStage:
     @property
     def num_worlds(self) -> int:
         return self.core.engine.num_worlds
+
+    @property
+    def by_friction(self) -> bool:
+        return self.core.grasping is None
 
     @property
     def view(self) -> PhysicsView:

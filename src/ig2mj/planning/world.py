@@ -93,7 +93,7 @@ class PlannedWorld:
     def senses(self) -> Senses:
         view = self.view
         if self._sensed is None or self._sensed[0] is not view:
-            self._sensed = view, sense(view, self.stage.agent, self.body.hands)
+            self._sensed = view, sense(view, self.stage.agent, self.body.hands, self.body.friction)
         return self._sensed[1]
 
     @property

@@ -67,6 +67,10 @@ class SimulationStage:
         whole[self._own] = action[0]
         robots.act(whole)
 
+    @property
+    def by_friction(self) -> bool:
+        return self._simulation.core.grasping is None
+
     def ended(self, world: int) -> str | None:
         return None
 
