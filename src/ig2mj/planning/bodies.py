@@ -2,7 +2,8 @@
 
 `command` gives numbers of the controller's action in its own units. All of it is pure and batched.
 
-Axes: W worlds, n numbers of a robot's action, H hands of the robot, Q joints of all robots.
+Axes: W worlds, n numbers of a robot's action, H hands of the robot, F links of fingers, O objects, Y graspable bodies,
+Q joints of all robots.
 """
 
 from __future__ import annotations
@@ -32,7 +33,6 @@ from ig2mj.geometry.host_rotations import (
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.phases import Base, Phase, Until
 from ig2mj.scene.scene import Scene
-from ig2mj.scene.tables import SceneTables
 
 AHEAD = 0.35
 """rad of a base's direction from that of the way within which it drives; else it turns first."""
@@ -89,12 +89,20 @@ class Senses:
 class FrictionHolds:
     """What hands hold by friction alone, where no constraint says so: what two links of a hand's fingers press on."""
 
-    def __init__(self, tables: SceneTables, hands: Int[np.ndarray, "H"]):
-        self._links = (tables.finger_hand[None] == hands[:, None]).astype(np.int32)
-        self._bodies = (tables.graspable_object[:, None] == np.arange(tables.num_objects)).astype(np.int32)
+    def __init__(
+        self,
+        hand_of_link: Int[np.ndarray, "F"],
+        object_of_body: Int[np.ndarray, "Y"],
+        objects: int,
+        hands: Int[np.ndarray, "H"],
+    ):
+        """hand_of_link, object_of_body: numbers of each finger link's hand, and each graspable body's object."""
+        self._links = (hand_of_link[None] == hands[:, None]).astype(np.int32)
+        self._bodies = (object_of_body[:, None] == np.arange(objects)).astype(np.int32)
 
-    def __call__(self, view: PhysicsView) -> Bool[np.ndarray, "W H O"]:
-        pressed = (np.asarray(view.agent.finger_force) > PRESSED).astype(np.int32)
+    def __call__(self, force: Float[Array, "W F Y"]) -> Bool[np.ndarray, "W H O"]:
+        """force: N with which each link presses on each body (`AgentView.finger_force`)."""
+        pressed = (np.asarray(force) > PRESSED).astype(np.int32)
         return (np.einsum("hf,wfy->why", self._links, pressed) >= PRESSING).astype(np.int32) @ self._bodies > 0
 
 
@@ -106,7 +114,7 @@ def sense(view: PhysicsView, agent: int, hands: Int[np.ndarray, "H"], friction: 
         base_quat=np.asarray(a.base_quat)[:, agent],
         hand_pos=np.asarray(a.hand_pos)[:, hands],
         hand_quat=np.asarray(a.hand_quat)[:, hands],
-        held=np.asarray(view.held)[:, hands] if friction is None else friction(view),
+        held=np.asarray(view.held)[:, hands] if friction is None else friction(a.finger_force),
         touching=np.asarray(a.touching)[:, agent],
         joints=np.asarray(a.joint_pos),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import functools
+import itertools
 from collections.abc import Callable, Generator, Mapping
 
 import numpy as np
@@ -76,8 +77,8 @@ EMPTY, FULL = (0.04, 0.05), (0.004, 0.015)
 of a drawer with things in it. A hand moves in jerks, one in each agent step, under which things slide to the back."""
 
 ARM_SWING, ARM_MOVES = 0.35, 14
-"""Share of a joint's range by which an arm moves it from one stance, at most: a floating hand follows a door farther;
-and such moves for one primitive."""
+"""Share of a joint's range by which an arm moves it from one stance where it does not follow it to its end; and such
+moves for one primitive."""
 
 STANCES, WAYS = 20, 12
 """Stances for each grip, and ways of a hand that are looked for with one kind of grip, at most."""
@@ -251,8 +252,9 @@ def _plan(
     world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int, to: float = OPEN_TO
 ) -> _JointPlan | None:
     floor, obstacles = world.floor(), world.obstacles()
-    passed, step = 0, 1.0 if world.body.opening is None else ARM_SWING
-    for grips, end, pulls in _ways(world, joint, value, to):
+    passed, ways = 0, _ways(world, joint, value, to)
+    steps = (1.0,) if world.body.opening is None else (1.0, ARM_SWING)
+    for step, (grips, end, pulls) in itertools.product(steps, ways):
         fraction = min(end, joint.fraction + step) if value else max(end, joint.fraction - step)
         count, sweep = 0, joint.sweep(fraction)[:, :2]
         for grip in grips:

@@ -75,7 +75,9 @@ class PhysicsRung:
         """
         body = body or body_of(stage.scene, stage.controller, stage.agent)
         self.stage, self.body = stage, body
-        body.friction = FrictionHolds(stage.scene.tables, body.hands) if stage.by_friction else None
+        tables = stage.scene.tables
+        links, bodies, count = tables.finger_hand, tables.graspable_object, tables.num_objects
+        body.friction = FrictionHolds(links, bodies, count, body.hands) if stage.by_friction else None
         self.domain = Domain(stage.model, len(body.hands))
         self._planner = planner or MotionPlanner(stage.scene, stage.agent)
         self._query = query
