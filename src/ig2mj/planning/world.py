@@ -241,7 +241,7 @@ class PlannedWorld:
         footprint = BaseFootprint.of_robot(self.stage.scene, view, self.stage.agent, number, counts, arm)
         if counts and (holding or not any(held)):
             row = np.zeros(0) if self.senses.joints is None else self.senses.joints[number].astype(float)
-            spheres = self.body.arm_spheres(row, at_rest=not any(held))
+            spheres = self.body.arm_spheres(row, not any(held))
             aside = np.abs(spheres[:, 1]) if ahead else np.linalg.norm(spheres[:, :2], axis=1)
             middle = self.body.stands + spheres[:, 2]
             bottom, top = middle - spheres[:, 3], middle + spheres[:, 3]
