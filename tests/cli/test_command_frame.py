@@ -295,3 +295,14 @@ def test_a_seed_below_zero_is_refused_before_the_command_begins(command, capsys)
     command(run)
     assert cli.call(["probe", "--seed", "-1"]) == 2
     assert capsys.readouterr().err == "error: --seed -1: a seed is at least 0\n"
+
+
+def test_values_of_an_option_that_is_given_twice_add_up(command):
+    found = []
+
+    def run(*, set: tuple[str, ...] = (), worlds: int = 1) -> None:
+        found.append((set, worlds))
+
+    command(run)
+    assert cli.call(["probe", "--set", "a=1", "b=2", "--worlds", "4", "--set=c=3", "--set", "d=4"]) == 0
+    assert found == [(("a=1", "b=2", "c=3", "d=4"), 4)]

@@ -169,6 +169,8 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
             raise Ig2mjError(
                 f"--devices {devices} --worlds {count}: worlds must divide evenly over {len(shared)} devices"
             )
+        if shared and engine == "native":
+            raise Ig2mjError(f"--devices {devices} needs an engine that runs on devices: --set engine=warp, or jax")
         with team.turns():  # the first one samples start states where there are none, the others read them
             world = make(
                 chosen.env,

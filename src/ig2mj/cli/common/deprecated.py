@@ -67,29 +67,11 @@ def with_new_names(function: Callable[..., Any], prog: str, args: Sequence[str])
         if new.endswith("=") and not equals and waiting:
             value = waiting.pop(0)
         settings.append(new.removeprefix(_SET) + value)
-    word = _SET.strip()
-    out = _merged(out, word)
     if settings:
+        word = _SET.strip()
         at = len(out) - 1 - out[::-1].index(word) if word in out else len(out)
         out[at : at + 1] = [word, *settings]
     return out
-
-
-def _merged(words: list[str], option: str) -> list[str]:
-    """All values of an option that was given several times in one place, where it takes several: by itself tyro reads
-    the last ones alone."""
-    if words.count(option) < 2:
-        return words
-    values, rest, at, taking = list[str](), list[str](), 0, False
-    for word in words:
-        taking = word == option or (taking and not word.startswith("-"))
-        if word == option:
-            at = len(rest)
-        elif taking:
-            values.append(word)
-        else:
-            rest.append(word)
-    return [*rest[:at], option, *values, *rest[at:]]
 
 
 def new_subcommand(command: str, name: str, renamed: Mapping[str, str]) -> str:

@@ -17,9 +17,35 @@ from ig2mj.errors import Ig2mjError
 
 def parse_and_call(function: Callable[..., Any], prog: str, args: Sequence[str]) -> Any:
     """The function's result for the arguments of the command line. Raises SystemExit, as tyro does."""
-    args = with_changes(function, with_new_names(function, prog, args))
+    args = gathered(function, with_changes(function, with_new_names(function, prog, args)))
     _check_options(function, prog, args)
     return tyro.cli(_with_quiet_defaults(function), prog=prog, args=args, config=(tyro.conf.DisallowNone,))
+
+
+def gathered(function: Callable[..., Any], args: Sequence[str]) -> list[str]:
+    """The command line in which an option that takes several values, and is given several times, is given once, with
+    all of them: tyro takes the values of the last one alone."""
+    several = {name for name, hint in typing.get_type_hints(function, include_extras=True).items() if _is_tuple(hint)}
+    groups, first = list[list[str]]([[]]), dict[str, list[str]]()
+    for word in args:
+        option, equals, value = word.partition("=")
+        name = option.removeprefix("--").replace("-", "_")
+        if not word.startswith("--"):
+            groups[-1].append(word)
+        elif name not in several:
+            groups.append([word])
+        else:
+            known = first.setdefault(name, [option])
+            groups = [group for group in groups if group is not known] + [known]
+            known += [value] * bool(equals)
+    return [word for group in groups for word in group]
+
+
+def _is_tuple(hint: Any) -> bool:
+    """Of any length, and all values follow one option."""
+    bare, *about = typing.get_args(hint) if typing.get_origin(hint) is Annotated else (hint,)
+    others = (tyro.conf.UseAppendAction, tyro.conf.Positional)
+    return typing.get_origin(bare) is tuple and typing.get_args(bare)[-1] is ... and not any(a in others for a in about)
 
 
 _MEANT = {"num_envs": "worlds", "n_envs": "worlds", "num_worlds": "worlds"}
