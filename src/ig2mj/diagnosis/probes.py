@@ -26,6 +26,11 @@ def probe_warp() -> dict[str, Any]:
     """Devices that Warp sees, after a memory operation on each, and where it keeps compiled kernels."""
     import warp as wp
 
+    from ig2mj.process import prepare_warp
+    from ig2mj.process.kernel_cache import kernel_folder
+
+    folder = kernel_folder()
+    prepare_warp()
     wp.init()
     for device in wp.get_devices():
         array = wp.zeros(4, dtype=float, device=device)
@@ -34,7 +39,7 @@ def probe_warp() -> dict[str, Any]:
     return {
         "devices": [f"{d.alias} {d.name}" for d in wp.get_devices()],
         "cuda": [d.name for d in wp.get_cuda_devices()],
-        "cache": str(wp.config.kernel_cache_dir),
+        "cache": str(folder),
     }
 
 

@@ -28,7 +28,9 @@ or earlier by any caller; a second call does nothing. What the user has decided 
 
 `prepare_warp` (Warp engines):
   - `warp.config.log_level`: WARNING where it was INFO, and long compilations are reported on stderr instead.
-  - `warp.config.kernel_cache_dir`: below IG2MJ_CACHE_DIR, where that is set and Warp's own folder was not chosen.
+  - `warp.config.kernel_cache_dir`: below IG2MJ_CACHE_DIR, where that is set and Warp's own folder was not chosen;
+    a folder of this process where it cannot be written to. Modules are compiled where there is room for them, and
+    broken ones again (`ig2mj.process.kernel_cache`).
   - Three repairs of Warp 1.18, of its streams, graph captures and devices (`ig2mj.process.warp_repairs`).
   - Steps of MJX get a contact filter, MuJoCo Warp's callback, which drops what our engines' hands ignore and nothing
     in other models (`ig2mj.engine.warp.ignored_contacts`).

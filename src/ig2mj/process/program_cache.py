@@ -19,9 +19,9 @@ REMEDY = "free some space, or name another folder with IG2MJ_CACHE_DIR"
 
 
 @functools.cache
-def say_not_kept(folder: pathlib.Path, why: str) -> None:
+def say_not_kept(folder: pathlib.Path, why: str, what: str = "compiled programs") -> None:
     """One line on stderr, once per process and reason."""
-    print(f"ig2mj: compiled programs are not kept in {folder} ({why}): {REMEDY}", file=sys.stderr, flush=True)
+    print(f"ig2mj: {what} are not kept in {folder} ({why}): {REMEDY}", file=sys.stderr, flush=True)
 
 
 @functools.cache

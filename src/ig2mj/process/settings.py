@@ -18,6 +18,7 @@ from ig2mj.process.compilation import (
     report_warp_compilation,
     report_xla_compilation,
 )
+from ig2mj.process.kernel_cache import folder_of_warp, keep_kernels_sound, usable_kernel_folder
 from ig2mj.process.program_cache import keep_entries_sound, say_not_kept
 
 GL_INSTALL_HINT = "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6"
@@ -128,8 +129,10 @@ def prepare_warp() -> None:
 
     if wp.config.log_level == wp.LOG_INFO:  # the default: nobody asked for more or for less
         wp.config.log_level = wp.LOG_WARNING
-    if os.environ.get(CACHE_VARIABLE) and "WARP_CACHE_PATH" not in os.environ and not wp.config.kernel_cache_dir:
-        wp.config.kernel_cache_dir = str(cache_folder() / "warp")
+    folder = usable_kernel_folder()
+    if folder != folder_of_warp():
+        wp.config.kernel_cache_dir = str(folder)
+    keep_kernels_sound()
     report_warp_compilation()
     keep_external_streams()
     collect_nothing_during_captures()
