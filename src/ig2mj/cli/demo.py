@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import pathlib
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ig2mj.callbacks import ProgressCallback
+    from ig2mj.showcase.expert_video import Filmed
 
 Step = Callable[[str], "ProgressCallback"]
 """Opens a progress bar with a title."""
@@ -42,6 +45,8 @@ def run(
 
     from ig2mj.cli.common.printing import add_bar, progress_bar, stdout_console
     from ig2mj.errors import Ig2mjError
+    from ig2mj.process.spawning import processes_for, worker_processes
+    from ig2mj.showcase import expert_video
 
     if jobs < 1:
         raise Ig2mjError(f"--jobs {jobs}: at least one process is needed")
@@ -51,9 +56,14 @@ def run(
     with progress_bar() as bar:
         step = functools.partial(add_bar, bar)
         failed = _convert(console, step, small_home.NAME, out / "dataset", scene, jobs)
-        _look(console, step, scene, out / "images")
-        failed += _cook(console, step, scene, out / "cooking")
-        failed += _watch_expert(console, step, out / "expert.mp4")
+        with contextlib.ExitStack() as stack:
+            film = out / "expert.mp4"
+            watched = None
+            if jobs > 1 and processes_for(2) > 1:
+                watched = stack.enter_context(worker_processes(1)).submit(expert_video.film, film)
+            _look(console, step, scene, out / "images")
+            failed += _cook(console, step, scene, out / "cooking")
+            failed += _watch_expert(console, step, film, watched)
     console.print(f"{time.perf_counter() - start:.0f} s. Look around in it: [bold]{command('view', scene)}[/]")
     return 1 if failed else 0
 
@@ -94,10 +104,10 @@ def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     seconds = time.perf_counter() - began
     console.print(f"[bold]ran[/]        {world.time:.1f} s of physics in {seconds:.1f} s, loading included; "
                   f"nothing moved more than {moved * 1000:.1f} mm")  # fmt: skip
-    step("asking the predicates")(0, None, "what stands where (the first time compiles)")
-    places = first_home.what_stands_where(world)
     step("taking images")(0, None, "")
     images = first_home.take_images(world, folder)
+    step("asking the predicates")(0, None, "what stands where (the first time compiles)")
+    places = first_home.what_stands_where(world)
     rows = [(place.object, place.relation, place.support, place.room) for place in places]
     console.print(make_table("what stands where", ("object", "is", "what", "room"), rows))
     for file in images:
@@ -155,34 +165,15 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     return len(absent)
 
 
-def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
-    """A video of the scripted expert of CookingMeat; 1 if the steak is not cooked in the end."""
-    from ig2mj.envs.experts import expert_of
-    from ig2mj.envs.registry import make
-    from ig2mj.envs.rollout import play
+def _watch_expert(console: Console, step: Step, file: pathlib.Path, watched: Future[Filmed] | None) -> int:
+    """The video of an expert, which another process may be writing; 1 if the steak is not cooked in the end."""
     from ig2mj.process.settings import GL_INSTALL_HINT
-    from ig2mj.showcase.episode_video import EpisodeVideo
-    from ig2mj.viewer.offscreen import default_backend
+    from ig2mj.showcase import expert_video
 
     report = step("a robot cooks")
-    report(0, None, "sampling where the steak lies")
-    env = make("CookingMeat", robot="humanoid", engine="native", split="held_out", pool_size=1)
-    filmed = default_backend() != "warp"  # its images take seconds
-    video = EpisodeVideo(file, env, size=(640, 480)) if filmed else None
-
-    def watch(state: Any) -> None:
-        if video is not None:
-            video.see(state)
-        seconds = int(state.info["steps"][0]) * env.period
-        report(int(state.info["steps"][0]), None, f"{seconds:.1f} s")
-
-    try:
-        played = play(env, expert_of(env), 1, in_order=True, watch=watch)
-    finally:
-        if video is not None:
-            video.close()
-    cooked = played.success[0]
-    ending = "cooks the steak" if cooked else "does not cook the steak"
-    console.print(f"[bold]expert[/]     the humanoid {ending} in {played.steps * env.period:.1f} s")
-    console.print(f"[bold]video[/]      {file if filmed else f'none: it needs OpenGL ({GL_INSTALL_HINT})'}")
-    return 0 if cooked else 1
+    report(0, None, "")
+    filmed = watched.result() if watched is not None else expert_video.film(file, report)
+    ending = "cooks the steak" if filmed.cooked else "does not cook the steak"
+    console.print(f"[bold]expert[/]     the humanoid {ending} in {filmed.seconds:.1f} s")
+    console.print(f"[bold]video[/]      {file if filmed.video else f'none: it needs OpenGL ({GL_INSTALL_HINT})'}")
+    return 0 if filmed.cooked else 1

@@ -50,22 +50,21 @@ def what_stands_where(world: Simulation) -> list[FirstHomePlace]:
 
     Of several answers the smallest object is named: the fish is in the pan rather than on the stove.
     """
-    from ig2mj.predicates import Or, atom, compile_expression
+    from ig2mj.predicates.host_queries import HostQueries
+    from ig2mj.predicates.registry import find
     from ig2mj.states import StateModel, initial_states
 
     scene, view = world.scene, world.view
-    tables = scene.tables
-    pairs = _near_pairs(world)
-    atoms = [atom(relation, a, b) for a, b in pairs for relation in ("inside", "on_top")]
-    model = StateModel.of_manifest(tables, scene.manifest)
-    asked = compile_expression(model, Or(tuple(atoms)))
-    truth = np.asarray(asked.status(initial_states(model, 1), view).literals)[0]
+    pairs, names = _near_pairs(world), scene.tables.object_names
+    model = StateModel.of_manifest(scene.tables, scene.manifest)
+    states, queries = initial_states(model, 1), HostQueries.of(model)
     volume = {entry.name: float(np.prod(entry.bounding_box)) for entry in scene.manifest.objects}
     found: dict[str, tuple[float, str, str]] = {}
-    for stated, holds in zip(asked.atoms, truth.tolist(), strict=True):
-        a, b = stated.arguments
-        if holds and (a not in found or volume[b] < found[a][0]):
-            found[a] = (volume[b], stated.predicate, b)
+    for relation in ("inside", "on_top"):
+        for (a, b), holds in zip(pairs, queries.holds(find(relation), pairs, states, view)[0], strict=True):
+            thing, support = names[a], names[b]
+            if holds and (thing not in found or volume[support] < found[thing][0]):
+                found[thing] = (volume[support], relation, support)
     places = []
     for entry in scene.manifest.objects:
         if entry.fixed or entry.parked:
@@ -77,14 +76,13 @@ def what_stands_where(world: Simulation) -> list[FirstHomePlace]:
     return places
 
 
-def _near_pairs(world: Simulation) -> list[tuple[str, str]]:
-    """(loose object, other object) whose boxes meet: only of these anything can hold."""
+def _near_pairs(world: Simulation) -> list[tuple[int, int]]:
+    """(loose object, other object) whose boxes meet, as indices: only of these anything can hold."""
     view, tables = world.view, world.scene.tables
     low, high = np.asarray(view.aabb_low[0]) - NEAR / 2, np.asarray(view.aabb_high[0]) + NEAR / 2
     meet = np.all((low[:, None] < high[None]) & (high[:, None] > low[None]), axis=-1)
-    names = tables.object_names
     return [
-        (names[a], names[b])
+        (a, b)
         for a, b in np.argwhere(meet).tolist()
         if a != b and not (tables.object_fixed[a] or tables.object_parked[a] or tables.object_parked[b])
     ]
