@@ -3,7 +3,8 @@
     python -m benchmarks.learning.several_homes fit                   which homes each activity fits into, and why not
     python -m benchmarks.learning.several_homes pools --jobs 64       start states of the homes of both splits
     python -m benchmarks.learning.several_homes experts --jobs 16     success of the experts in each home
-    python -m benchmarks.learning.several_homes throughput            agent steps/s of eight homes, together and alone
+    python -m benchmarks.learning.several_homes throughput            agent steps/s of eight homes, stepped in turn, and
+                                                                      of each home alone with as many worlds
     python -m benchmarks.learning.several_homes axes                  agent steps/s with each axis of randomization
 
 Every row is printed as JSON when it is known, and appended to `--out`; rows that are there are not measured again.
@@ -25,6 +26,7 @@ import ig2mj
 from benchmarks.harness.results import keep_row, machine, provenance
 from ig2mj.envs.experts import expert_of
 from ig2mj.errors import Ig2mjError
+from ig2mj.process import keep_scratch_in_place
 from ig2mj.process.processors import available
 from ig2mj.scene.paths import shipped_homes
 from ig2mj.tasks.activities import ACTIVITIES
@@ -36,7 +38,7 @@ from ig2mj.tasks.task import Task
 from ig2mj.worlds.randomize import AXES
 
 WORLDS, STEPS, ROWS = 1024, 40, 64
-"""Worlds of a throughput measurement, agent steps after as many unmeasured ones, and start states of each home."""
+"""Worlds of a measurement of axes, agent steps after as many unmeasured ones, and start states of each home."""
 
 
 def fit(args: argparse.Namespace) -> list[dict[str, Any]]:
@@ -64,9 +66,9 @@ def experts(args: argparse.Namespace) -> list[dict[str, Any]]:
 
 
 def throughput(args: argparse.Namespace) -> list[dict[str, Any]]:
-    """Each home alone with all worlds, then all homes together with as many."""
-    alone = [{"what": "throughput", "task": args.tasks[0], "homes": [home]} for home in TRAIN_HOMES]
-    return [*alone, {"what": "throughput", "task": args.tasks[0], "homes": list(TRAIN_HOMES)}]
+    """All homes together, then each home alone with as many worlds."""
+    sets = [list(TRAIN_HOMES), *([home] for home in TRAIN_HOMES)]
+    return [{"what": "throughput", "task": args.tasks[0], "homes": homes, "worlds": args.worlds} for homes in sets]
 
 
 def axes(args: argparse.Namespace) -> list[dict[str, Any]]:
@@ -114,8 +116,8 @@ def _experts(job: dict[str, Any]) -> dict[str, Any]:
 
 
 def _throughput(job: dict[str, Any]) -> dict[str, Any]:
-    homes = job["homes"]
-    return _rate(ig2mj.make(job["task"], worlds=WORLDS, home=homes, pool_size=ROWS, **IMAGES))
+    keep_scratch_in_place()  # as trainings in several homes do
+    return _rate(ig2mj.make(job["task"], worlds=job["worlds"], home=job["homes"], pool_size=ROWS, **IMAGES))
 
 
 def _axes(job: dict[str, Any]) -> dict[str, Any]:
@@ -183,6 +185,7 @@ def main() -> None:
     parser.add_argument("kind", choices=KINDS)
     parser.add_argument("--tasks", nargs="+", default=["CookingMeat", "GraspingBook"])
     parser.add_argument("--rows", type=int, default=ROWS)
+    parser.add_argument("--worlds", type=int, default=8192, help="of throughput: all worlds together")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=pathlib.Path)
     args = parser.parse_args()

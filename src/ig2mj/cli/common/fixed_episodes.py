@@ -64,7 +64,7 @@ def _check_grasping(episodes: Episodes, grasping: str) -> None:
 def evaluate_policy(name: str, request: Request, stochastic: bool) -> int:
     """A policy of ours on `request.axes`. Returns the exit status."""
     from ig2mj.learn.evaluate import acting
-    from ig2mj.learn.policies import Policy, looks_of, objects_of, robot_of
+    from ig2mj.learn.policies import Policy, doors_in, horizon_on_card, looks_of, objects_of, robot_of
     from ig2mj.learn.shipped import find_policy
 
     request.check()
@@ -82,6 +82,8 @@ def evaluate_policy(name: str, request: Request, stochastic: bool) -> int:
         "relaxed_thresholds": policy.card.get("paper_rl", False),
         "looks": looks_of(policy),
         "objects": objects_of(policy, file),
+        **doors_in(depends),
+        **horizon_on_card(policy.card),
     }
 
     def act_of(env: Environment) -> Act:
