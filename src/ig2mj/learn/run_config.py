@@ -30,6 +30,7 @@ from ig2mj.learn.bc import BCConfig
 from ig2mj.learn.occlusion import OcclusionConfig
 from ig2mj.learn.settings import configure_all, written
 from ig2mj.learn.shipped import CHECKOUT, INSTALLED, find_policy
+from ig2mj.scene.paths import shipped_homes
 from ig2mj.scene.scene import check_looks
 from ig2mj.sensors.base import CAMERA_LOOKS
 from ig2mj.worlds.randomize import Randomize
@@ -108,7 +109,8 @@ class RunSettings:
         found: dict[str, Any] = {}
         if self.homes:
             names = self.homes.split(",")
-            found["homes"] = names[0] if names[0] in ("train", "held_out") else names
+            is_home = names[0] in shipped_homes() or pathlib.Path(names[0]).exists()
+            found["homes"] = names if is_home or len(names) > 1 else names[0]  # `make` knows the sets of homes
         if self.randomize:
             axes = Randomize.every() if self.randomize == "all" else Randomize.of(self.randomize.split(","))
             found["randomize"] = axes

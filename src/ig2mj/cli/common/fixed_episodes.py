@@ -72,7 +72,7 @@ def evaluate_policy(name: str, request: Request, stochastic: bool) -> int:
     policy = Policy.load(file)
     depends = policy.card["depends"]
     episodes = chosen_episodes(depends["task"], request.file)
-    axes, count = check_episodes(request.axes or NOMINAL, request.episodes, episodes)
+    axes, count = check_episodes(NOMINAL if request.axes is None else request.axes, request.episodes, episodes)
     _check_grasping(episodes, request.grasping or depends["grasping"])
     options = {
         **request.make_options(count, 1000),
@@ -110,7 +110,7 @@ def evaluate_server(
         raise Ig2mjError(f"--image-size {size}: at least one pixel")
     known = find_task(task)
     episodes = chosen_episodes(known.name, request.file)
-    axes, count = check_episodes(request.axes or NOMINAL, request.episodes, episodes)
+    axes, count = check_episodes(NOMINAL if request.axes is None else request.axes, request.episodes, episodes)
     server = connect(address, request.worlds or SERVER_WORLDS, timeout)
     try:
         says = server.metadata
