@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ig2mj.errors import EngineError, InputError, UnknownNameError
+from ig2mj.process.program_cache import say_not_kept
 from ig2mj.tasks import pools
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.pool_files import SHIPPED, StartStates, different_rows
@@ -119,6 +120,16 @@ def test_a_smaller_pool_is_the_first_rows_and_a_larger_one_goes_on(states, sampl
     assert np.asarray(more.physics.time) == pytest.approx([0.1, 1.1, 3.1, 4.1, 6.1, 7.1, 9.1])
     assert equal(more.rows(np.arange(5)), whole)
     assert len(list(states.cached.parent.glob("*.npz"))) == 1
+
+
+def test_what_cannot_be_kept_is_used_all_the_same(states, sampled, cache, capsys):
+    sample, _ = sampled
+    say_not_kept.cache_clear()
+    (cache / "pools").write_text("a file where a folder must be", encoding="utf-8")
+    assert states.pool(2, sample).size == 2
+    assert f"start states are not kept in {cache / 'pools'} (" in capsys.readouterr().err
+    with pytest.raises(OSError, match="pools"):
+        states.pool(2, sample, cache / "pools" / "own.npz")
 
 
 def test_what_is_sampled_is_rounded_before_it_is_used(states, sampled):

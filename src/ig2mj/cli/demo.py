@@ -60,7 +60,7 @@ def run(
             film = out / "expert.mp4"
             watched = None
             if jobs > 1 and processes_for(2) > 1:
-                watched = stack.enter_context(worker_processes(1)).submit(expert_video.film, film)
+                watched = stack.enter_context(worker_processes(1, ctrl_c=True)).submit(expert_video.film, film)
             _look(console, step, scene, out / "images")
             failed += _cook(console, step, scene, out / "cooking")
             failed += _watch_expert(console, step, film, watched)

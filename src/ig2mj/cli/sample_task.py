@@ -77,6 +77,8 @@ def _keep(pools: list[tuple[Task, str]], count: int, jobs: int, force: bool, out
     import contextlib
 
     from ig2mj.cli.common.printing import add_bar, progress_bar
+    from ig2mj.errors import Ig2mjError
+    from ig2mj.process.program_cache import REMEDY
     from ig2mj.tasks.pool_files import different_rows
     from ig2mj.tasks.pools import COUNT, make_pool, pool_of, sampling_processes, start_states
     from ig2mj.worlds.pool import load_pool
@@ -97,6 +99,8 @@ def _keep(pools: list[tuple[Task, str]], count: int, jobs: int, force: bool, out
                 pool_of(task, split, rows, **options)
                 if ships is not None and ships.size >= rows:
                     return f"{states.shipped}: {about}, which ship", False
+                if not states.cached.is_file():
+                    raise Ig2mjError(f"{states.cached} cannot be written: {REMEDY}")
                 return f"{states.cached}: {about}", False
             file = out / states.cached.name
             if force:

@@ -23,6 +23,7 @@ import numpy as np
 from ig2mj.errors import InputError
 from ig2mj.files.unfinished import unfinished
 from ig2mj.process.compilation import cache_folder
+from ig2mj.process.program_cache import say_not_kept
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.archive import read_header
 from ig2mj.worlds.pool import Pool, load_pool, save_pool, stack
@@ -81,7 +82,8 @@ class StartStates:
         """The first rows: from the file that ships, from the cache, or sampled now and kept.
 
         Args:
-          rows: how many. file: where to keep what is sampled, and the only file to read; None: the cache.
+          rows: how many. file: where to keep what is sampled, and the only file to read; None: the cache. What cannot
+            be written there is used all the same, after a line on stderr.
 
         Returns:
           A pool of so many rows, or of as many as `sample` finds.
@@ -109,8 +111,14 @@ class StartStates:
         if not pools:
             raise ValueError("`sample` found no row and raised nothing")
         whole = stack(pools)
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        save_pool(whole, kept, self.scene, {**self.note, TRIED: tried})
+        try:
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            save_pool(whole, kept, self.scene, {**self.note, TRIED: tried})
+        except (OSError, InputError) as failure:
+            if file is not None:
+                raise
+            cause = failure if isinstance(failure, OSError) else failure.__cause__
+            say_not_kept(kept.parent, getattr(cause, "strerror", None) or type(failure).__name__, "start states")
         return _first(whole, rows)
 
     def _files(self, folder: pathlib.Path) -> list[pathlib.Path]:
