@@ -18,7 +18,7 @@ from ..base.transforms import read_origin
 from ..base.xml_reader import Element, is_huge, number, numbers, read_xml, where
 from .mesh_files import FORMATS
 from .urdf_geometry import GeometryReader
-from .urdf_leftovers import read_leftovers, warn_of_degrees, warn_of_macros
+from .urdf_leftovers import read_leftovers, warn_of_degrees, warn_of_macros, warn_of_repetitions
 from .urdf_materials import UrdfMaterials
 from .urdf_tree import check_counts, check_name, find_tree
 
@@ -64,6 +64,7 @@ def read_urdf(
     read_leftovers(robot, warnings)
     warn_of_degrees(robot, warnings)
     warn_of_macros(robot, warnings)
+    warn_of_repetitions(robot, warnings)
     guard = FileGuard(path, root, mesh_folder, allow_outside, mesh_root=mesh_root, package_path=package_path)
     reader = GeometryReader(guard, UrdfMaterials(robot, guard, warnings), warnings)
     check_counts(robot, path)
@@ -94,14 +95,16 @@ def _read_link(element: Element, reader: GeometryReader) -> Link:
     link.visuals = [shape for v in element.iterfind("visual") for shape in reader.visual(v)]
     inertial = element.find("inertial")
     if inertial is not None:
-        link.inertial = _read_inertial(inertial, file)
+        link.inertial = _read_inertial(inertial, file, reader.warnings)
     return link
 
 
-def _read_inertial(element: Element, file: pathlib.Path) -> Inertial | None:
+def _read_inertial(element: Element, file: pathlib.Path, warnings: list[str]) -> Inertial | None:
     """An <inertial>; a missing <inertia> is zero (to be computed), a missing <mass> means there is none."""
     mass_element = element.find("mass")
     if mass_element is None:
+        if len(element):
+            warnings.append(f"{where(element)}: has no <mass>: it is left out")
         return None
     mass = number(mass_element, "value", file)
     if mass < 0:

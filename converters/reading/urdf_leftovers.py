@@ -1,4 +1,4 @@
-"""What is no URDF and yet stands in URDFs: vectors of more than three numbers, xacro's defaults, degrees.
+"""What is no URDF and yet stands in URDFs: vectors of more than three numbers, xacro's defaults, degrees, repetitions.
 
 Bullet reads the first three numbers of a vector and passes over the rest. `$(optenv NAME default)` stays where a file
 of xacro or roslaunch was not expanded; the default is read, never the environment.
@@ -63,3 +63,21 @@ def warn_of_degrees(robot: Element, warnings: list[str]) -> None:
         if any(most < abs(v) < UNLIMITED for v in values if v is not None):
             text = f"{attribute}='{shortened(element.get(attribute), 40)}' is read as radians; is it in degrees?"
             warnings.append(f"{where(element)}: {text}")
+
+
+ONCE = {
+    "link": ("inertial",),
+    "inertial": ("origin", "mass", "inertia"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
+    "visual": ("origin", "geometry", "material"),
+    "collision": ("origin", "geometry"),
+}
+"""Elements, and those in them of which there may be one. (A second shape in a geometry is an error.)"""
+
+
+def warn_of_repetitions(robot: Element, warnings: list[str]) -> None:
+    """Of elements that may stand once the first is read, as urdfdom and Bullet do; the others are lost."""
+    for element in robot.iter(*ONCE):
+        for tag in ONCE[element.tag]:
+            if (count := len(element.findall(tag))) > 1:
+                warnings.append(f"{where(element)}: has {count} {tag} elements: the first is read")

@@ -70,6 +70,9 @@ class UrdfMaterials:
         if len(values) not in (3, 4) or None in values:
             self._warn(f"{where(colour)}: rgba='{shortened(text, 40)}' is not 3 or 4 numbers: rendered without it")
             return None
+        if max(v for v in values if v is not None) > 1:
+            said = f"{where(colour)}: rgba='{shortened(text, 40)}'"
+            self._warn(f"{said} has numbers above 1, which are read as 1; are they of 255?")
         r, g, b, a = (float(v) for v in np.append(np.clip(np.array(values, dtype=float), 0, 1), 1.0)[:4])
         return r, g, b, a or 1.0
 

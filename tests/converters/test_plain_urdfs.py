@@ -272,3 +272,33 @@ def test_a_visual_mesh_of_fewer_than_four_vertices_is_left_out(tmp_path):
     assert "r: link 'l': a visual mesh has fewer than 4 vertices and is left out" in outcome.first_warnings
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "object.xml"))
     assert model.ngeom == 3 and model.nmesh == 0  # the ground, a collision box and a visual one
+
+
+BODY = '<collision><geometry><box size=".2 .1 .1"/></geometry></collision>'
+INERTIA = '<inertia ixx=".001" iyy=".001" izz=".001"/>'
+
+
+@pytest.mark.parametrize(
+    ("inside", "warning"),
+    [
+        (f'<inertial><mass value="1"/>{INERTIA}</inertial><inertial><mass value="5"/></inertial>', "has 2 inertial"),
+        (f'<inertial><mass value="1"/><mass value="5"/>{INERTIA}</inertial>', "has 2 mass elements: the first is read"),
+        (f"<inertial>{INERTIA}</inertial>", "has no <mass>: it is left out"),
+    ],
+)
+def test_what_is_read_once_or_not_at_all_is_a_warning(tmp_path, inside, warning):
+    model = read_urdf(urdf(tmp_path, f'<link name="body">{inside}{BODY}</link>'), "toy", "thing")
+    assert [w for w in model.warnings if warning in w]
+    inertial = model.links["body"].inertial
+    assert inertial is None if "no <mass>" in warning else inertial.mass == 1.0
+
+
+def test_a_second_axis_or_limit_of_a_joint_is_a_warning(tmp_path):
+    links = "".join(f'<link name="{name}">{BODY}</link>' for name in "ab")
+    twice = '<limit lower="0" upper="1"/><limit lower="0" upper="2"/><axis xyz="0 1 0"/>'
+    model = read_urdf(urdf(tmp_path, links + JOINT.format("j", "revolute", "a", "b", twice)), "toy", "thing")
+    assert {w.partition(": has ")[2] for w in model.warnings if ": has " in w} == {
+        "2 axis elements: the first is read",
+        "2 limit elements: the first is read",
+    }
+    assert model.joints["j"].upper == 1.0 and model.joints["j"].axis[2] == 1.0

@@ -81,6 +81,11 @@ def test_numbers_are_clipped_and_three_are_opaque(folder):
     assert look(read(folder, visual(colour("0 0 1 0"))))[0] == BLUE, "an alpha of 0 is drawn as 1"
 
 
+def test_numbers_of_a_colour_above_one_are_a_warning(folder):
+    assert "are they of 255?" in " ".join(read(folder, visual(colour("255 128 0"))).warnings)
+    assert "255" not in " ".join(read(folder, visual(colour("1 0.5 0"))).warnings)
+
+
 def test_a_texture_of_the_urdf_is_put_on_meshes_and_its_mean_on_primitives(folder):
     Image.new("RGB", (2, 2), (0, 0, 255)).save(folder.write("t.png", ""))
     folder.write("v.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n")
