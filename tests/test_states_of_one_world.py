@@ -175,8 +175,9 @@ def test_wrong_names_and_values_are_typed_errors_of_one_line(world, call, error,
 
 def test_a_predicate_without_the_ability_is_false_with_a_warning(tiny_home):
     world = ig2mj.Simulation(tiny_home)
-    with pytest.warns(AbilityWarning):
+    with pytest.warns(AbilityWarning) as caught:
         assert not world.predicate("frozen", "ball")
+    assert caught[0].filename == __file__, "the warning names the line of the user's code"
 
 
 def test_a_file_of_another_scene_is_refused(world, tmp_path):

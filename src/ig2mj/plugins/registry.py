@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 from ig2mj.errors import PluginError
 from ig2mj.plugins.entry_points import Plugin, installed
 from ig2mj.plugins.named_files import import_named
-from ig2mj.process.deprecation import OURS
+from ig2mj.process.user_warning import OURS
 
 T = TypeVar("T")
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import warnings
 from collections.abc import Sequence
 
 import jax.numpy as jnp
@@ -24,6 +23,7 @@ from ig2mj.predicates.base import ANY_ROOM, Context, Predicate
 from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.registry import find
 from ig2mj.predicates.substances import substance_index
+from ig2mj.process.user_warning import warn_user
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query
 
@@ -168,7 +168,7 @@ def resolve(model: StateModel, atom: Atom, strict: bool = False) -> Literal:
             raise AbilityError(message)
         if (predicate.name, name) not in _WARNED:
             _WARNED.add((predicate.name, name))
-            warnings.warn(f"{message}; it is False", AbilityWarning, stacklevel=2)
+            warn_user(f"{message}; it is False", AbilityWarning)
     return Literal(atom, predicate, arguments, able)
 
 

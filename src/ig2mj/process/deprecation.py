@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-import warnings
-
-OURS = ("ig2mj", "ig2mj_converters", "ig2mj_homes", "jaxtyping", "beartype")
-"""Packages whose frames are not the user's code; the last two wrap functions while tests run."""
+from ig2mj.process.user_warning import warn_user
 
 
 def rename_text(old: str, new: str) -> str:
@@ -20,8 +16,5 @@ def warn_renamed(old: str, new: str, owner: str = "") -> None:
     Args:
       owner: what the name belongs to, e.g. a class.
     """
-    level, frame = 2, sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in OURS:
-        level, frame = level + 1, frame.f_back
     message = f"{owner}: {rename_text(old, new)}" if owner else rename_text(old, new)
-    warnings.warn(message, FutureWarning, stacklevel=level)
+    warn_user(message, FutureWarning)

@@ -9,7 +9,7 @@ import hashlib
 import json
 import os
 import pathlib
-import warnings
+import shlex
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol, runtime_checkable
@@ -21,6 +21,7 @@ import numpy as np
 from ig2mj.cluster.jobs import import_function
 from ig2mj.errors import Ig2mjError, InputError, ManifestError, UnknownNameError, without_lines
 from ig2mj.files.inside import inside
+from ig2mj.process.user_warning import warn_user
 from ig2mj.scene.additions import Addition, plan_additions
 from ig2mj.scene.build_tables import build_tables
 from ig2mj.scene.ceilings import add_ceiling
@@ -276,11 +277,8 @@ def load_scene(
     file = model_file(path)
     home = load_manifest(file.parent / MANIFEST_FILE)
     if home.format_version < FORMAT_VERSION:
-        warnings.warn(
-            f"{file.parent}: of an older format, in which containers hold nothing ({UPGRADE} {file.parent})",
-            OldFormatWarning,
-            stacklevel=2,
-        )
+        fix = f"{UPGRADE} {shlex.quote(str(file.parent))}"
+        warn_user(f"{file.parent}: of an older format, in which containers hold nothing ({fix})", OldFormatWarning)
     named, others = read_substances([*substances_as_text(_listed(substances)), *_listed(objects)])
     if named:
         home = msgspec.structs.replace(home, substances=list(dict.fromkeys((*home.substances, *named))))

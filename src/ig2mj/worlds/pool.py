@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -25,6 +24,7 @@ from ig2mj.engine.layout import make_layout
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, counted, length
 from ig2mj.errors import InputError
+from ig2mj.process.user_warning import warn_user
 from ig2mj.scene.found_again import AdditionEntry, entries_of, find_again
 from ig2mj.scene.paths import shipped_homes
 from ig2mj.scene.scene import Agent, Scene, load_scene
@@ -197,7 +197,7 @@ def _built(
         pool = dataclasses.replace(pool, states=build(type(initial), {**arrays, **lacking}, file, "states."))
     if foreign := foreign_fields(header, pool.states):
         named = ", ".join(f"'{field}' of {source}" for field, source in foreign.items())
-        warnings.warn(f"{file}: states of plug-ins that are not here are left out: {named}", stacklevel=3)
+        warn_user(f"{file}: states of plug-ins that are not here are left out: {named}", UserWarning)
     return pool
 
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import threading
-import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -27,6 +26,7 @@ from ig2mj.engine.warp.patches import pins, table
 from ig2mj.engine.warp.patches.graphs import graphs_kept
 from ig2mj.engine.warp.patches.programs import traced_with
 from ig2mj.engine.warp.patches.replacements import KERNELS
+from ig2mj.process.user_warning import warn_user
 
 __all__ = [
     "awake_kernels",
@@ -57,7 +57,7 @@ def fit() -> bool:
     if warn:
         first, *others = wrong
         more = f" (and {len(others)} more)" if others else ""
-        warnings.warn(f"MuJoCo Warp's own, slower kernels run: {first}{more}", stacklevel=3)
+        warn_user(f"MuJoCo Warp's own, slower kernels run: {first}{more}", UserWarning)
     return False
 
 
