@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ig2mj.agents.base import ACTION_PERIOD, Controller
 from ig2mj.agents.fetch.controller import GAIN, FetchController
@@ -119,11 +119,20 @@ class ArmBody(WheeledBody):
             place = self._places(name)
             action[:, place] = np.where(moves[:, None], drive[:, place], 0.0)
         mine, move, turn = self._hand_step(senses, rows)
+        if isinstance(self._controller, FetchController):
+            move += self._carried_back(senses, moves & (rows["hand"] < 0))
         self._act(action, senses, mine, move, turn)
         held = senses.held[:, 0].any(1)
         closed = np.where((rows["close"] < 0) | ~mine, held, rows["close"] > 0)
         action[:, self._places(self._close)] = np.where(closed, -1.0, 1.0)[:, None]
         return action
+
+    def _carried_back(self, senses: Senses, drives: Bool[np.ndarray, "W"]) -> Float[np.ndarray, "W 3"]:
+        """m by which hands that carry something while the base drives are moved back to where they carry, sideways and
+        up, base's frame: inverse kinematics draw an arm to its posture at rest, by millimetres in each agent step."""
+        own = quat_rotate_inverse(senses.base_quat, grip_of(senses, 0, self.grips[0]) - senses.base_pos)
+        left = np.clip(PULL * (self.carry[0] - np.asarray(own)), -FASTEST, FASTEST) * np.array([0.0, 1.0, 1.0])
+        return np.where((drives & senses.held[:, 0].any(1))[:, None], left, 0.0)
 
     @property
     def _close(self) -> str:
