@@ -11,7 +11,7 @@ import dataclasses
 from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.planning.cleaning_area import cleaning_area, is_covered
@@ -19,7 +19,18 @@ from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp, put_down_others
 from ig2mj.planning.handing_over import hand_over
-from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_path, hand_with, strayed, travel, vector3
+from ig2mj.planning.moves import (
+    UP,
+    Primitive,
+    Program,
+    ahead,
+    go_home_past,
+    hand_path,
+    hand_with,
+    strayed,
+    travel,
+    vector3,
+)
 from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.placing import bring_out
@@ -37,9 +48,6 @@ outside of its box."""
 
 PRESSES = 4
 """Agent steps that a tool is pressed: with each the hand is pulled farther into the face."""
-
-RAISED = 0.25
-"""m that a tool is lifted before the hand goes back to where it carries it."""
 
 TURNS = (np.pi / 2, -np.pi / 2, np.pi)
 """rad about a face's normal by which a tool is turned where it has no room otherwise."""
@@ -61,6 +69,10 @@ FAR = 0.6
 
 ENOUGH, OVERS = 6, 3
 """Particles that are enough for a stance, and turns of a tool in which ways over a rim are looked for."""
+
+OPEN, ROOM, HIDDEN, HIDDEN_WORTH = np.array([0.12, 0.2, 0.3]), 0.06, 2, 0.25
+"""m before a face, and around it, that have to be free for a tool to come straight to it; particles that a stroke below
+something has to cover more than others to be chosen, and what these count."""
 
 TRIES = 4
 """Times that a particle is gone for."""
@@ -88,7 +100,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             yield from toggle(True)(world, Step("toggle_on", (tool,)))
         reason, detail, lost, tried = "no_base", f"no dirt of {name} is in reach", 0, collections.Counter[int]()
         visited: list[Stance] = []
-        opened, moved = Tried(), set[str]()
+        opened, moved, came = Tried(), set[str](), list[Vector]()
         for attempt in range(ROUNDS):
             if not world.facts.holds(predicate, name):
                 break
@@ -106,15 +118,15 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 hand = hand_with(world, tool)
             spots = [spot for spot in world.dirt(predicate, name) if tried[spot.number] < TRIES]
             spots.sort(key=lambda spot: tried[spot.number])
-            plan = _plan(world, tool, hand, spots, visited)
+            plan = _plan(world, name, tool, hand, spots, visited)
             while plan is None and (yield from open_around(world, name, opened)):
-                plan = _plan(world, tool, hand, spots, visited)
+                plan = _plan(world, name, tool, hand, spots, visited)
             while plan is None and (yield from _clear_away(world, name, tool, spots, moved)) and tool in world.held:
-                plan = _plan(world, tool, hand, spots, ())
+                plan = _plan(world, name, tool, hand, spots, ())
             if plan is None:
                 break
             if strayed(world, hand):
-                yield _back(world, hand)
+                yield from go_home_past(world, hand, came)
                 if tool not in world.held:
                     continue
             visited.append(plan.stance)
@@ -130,12 +142,13 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                     continue
                 program = _program(world, tool, hand, stroke)
                 if not program and strayed(world, hand):
-                    yield _back(world, hand)
+                    yield from go_home_past(world, hand, came)
                     program = _program(world, tool, hand, stroke) if tool in world.held else []
                 if program:
+                    came = [world.grip(hand), *(np.array(p.pos) for p in program[:-2] if p.pos is not None)]
                     reason, detail = (yield program), f"{tool} did not take enough off {name}"
         if tool in world.held:
-            yield _back(world, hand_with(world, tool))
+            yield from go_home_past(world, hand_with(world, tool), came)
         if not world.facts.holds(predicate, name):
             return Outcome()
         return Outcome(reason or "not_true_after", detail)
@@ -194,20 +207,30 @@ class _Region:
         """Grasp point of the hand right before."""
         return self.at(spot) + self.lifted * spot.normal
 
-    def covers(self, grip: Vector, spots: Sequence[DirtSpot]) -> list[DirtSpot]:
-        low, high = grip + self.low - SLACK, grip + self.high + SLACK
-        return [s for s in spots if (low <= s.pos).all() and (s.pos <= high).all()]
+
+class _HeldTool:
+    """A tool as a hand holds it now: the part that cleans, and spheres of hand and tool, m from the grasp point."""
+
+    def __init__(self, world: PlannedWorld, tool: str, hand: int):
+        self.world, self.tool, self.hand = world, tool, hand
+        area, self.out = cleaning_area(world, tool)
+        self.has_area = area is not None
+        self.corners = (world.vertices(tool) if area is None else area) - world.grip(hand)
+        self._spheres = world.spheres(*world.hand_axes(hand), holding=tool, hand=hand)
+
+    def spheres(self, rotation: Rotation) -> Float[np.ndarray, "S 4"]:
+        """Of hand and tool, if they were turned."""
+        return np.concatenate([self._spheres[:, :3] @ rotation.T, self._spheres[:, 3:]], axis=1)
 
 
-def _regions(world: PlannedWorld, tool: str, hand: int, yaw: float, normal: Vector) -> list[_Region]:
+def _regions(held: _HeldTool, yaw: float, normal: Vector) -> list[_Region]:
     """Turns of a tool with its box, for a robot that looks along `yaw`, rad: with its cleaning area towards the face;
     as it is carried; of a hand that floats, turned about the normal and tilted, too, and close to the face, where there
     is less room. A tilted tool cleans in a larger box."""
-    area, out = cleaning_area(world, tool)
-    points = (world.vertices(tool) if area is None else area) - world.grip(hand)
+    world, points = held.world, held.corners
     carried = about_vertical(yaw - world.base[1])
-    facing = carried if area is None else turn_onto(carried @ out, -normal) @ carried
-    rotations = [facing] if area is None else [facing, carried]
+    facing = turn_onto(carried @ held.out, -normal) @ carried if held.has_area else carried
+    rotations = [facing, carried] if held.has_area else [facing]
     if world.body.opening is not None:
         return [_Region.turned(r, points) for r in rotations]
     rotations += [_about(normal, angle) @ facing for angle in TURNS]
@@ -229,11 +252,15 @@ def _about(axis: Vector, angle: float) -> Rotation:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Stroke:
-    """A particle that a tool is pressed on, the number of its turn, and all particles that it takes off there."""
+    """A particle that a tool is pressed on, the number of its turn, and all particles that it takes off there.
+
+    `roofed`: it is on a loose thing with something before the face, so that the tool easily pushes the thing over.
+    """
 
     spot: DirtSpot
     turn: int
     covered: list[DirtSpot]
+    roofed: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -247,27 +274,33 @@ class _CleanPlan:
     def covered(self) -> list[DirtSpot]:
         return [spot for stroke in self.strokes for spot in stroke.covered]
 
+    @property
+    def worth(self) -> float:
+        """Particles, of which those below something count less."""
+        return sum(len(s.covered) * (HIDDEN_WORTH if s.roofed else 1.0) for s in self.strokes)
+
 
 def _plan(
-    world: PlannedWorld, tool: str, hand: int, spots: Sequence[DirtSpot], visited: Sequence[Stance]
+    world: PlannedWorld, name: str, tool: str, hand: int, spots: Sequence[DirtSpot], visited: Sequence[Stance]
 ) -> _CleanPlan | None:
     """The stance from which most particles are in reach, of those near the nearest ones that were not visited."""
     floor, obstacles = world.floor(), world.obstacles([tool])
     spots = [s for s in spots if s.normal[2] > LOWEST]
     away = world.away(world.spheres(*world.hand_axes(hand), holding=tool, hand=hand))
+    held, loose = _HeldTool(world, tool, hand), not world.domain.fixed(name)
     best: _CleanPlan | None = None
     seen = [*visited]
-    looked = 0
+    looked, enough = 0, min(ENOUGH, len(spots))
     for aim in spots:
         known = len(seen)
         for stance in stances(world, hand, aim.pos + PRESSED * aim.normal, floor, away, STANCES):
             if any(np.linalg.norm(np.subtract(stance.xy, v.xy)) < ELSEWHERE for v in seen):
                 continue
             seen.append(stance)
-            plan = _From(world, tool, hand, stance, obstacles).plan(spots)
-            if plan is not None and (best is None or len(plan.covered) > len(best.covered)):
+            plan = _From(held, stance, obstacles, loose).plan(spots)
+            if plan is not None and (best is None or plan.worth > best.worth):
                 best = plan
-            if best is not None and len(best.covered) >= ENOUGH:
+            if best is not None and best.worth >= enough:
                 return best
         looked += len(seen) > known
         if looked == NEAREST:
@@ -278,11 +311,12 @@ def _plan(
 class _From:
     """Strokes of a tool from one stance."""
 
-    def __init__(self, world: PlannedWorld, tool: str, hand: int, stance: Stance, obstacles: Obstacles):
-        """`obstacles`: all but the tool."""
-        self._world, self._tool, self._hand, self._stance = world, tool, hand, stance
-        self._obstacles = obstacles.about(stance.xy, *world.body.trunk)
-        self._start = world.carried(hand, stance)
+    def __init__(self, held: _HeldTool, stance: Stance, obstacles: Obstacles, loose: bool):
+        """`obstacles`: all but the tool. loose: what is cleaned can move."""
+        self._loose = loose
+        self._held, self._world, self._hand, self._stance = held, held.world, held.hand, stance
+        self._obstacles = obstacles.about(stance.xy, *held.world.body.trunk)
+        self._start = held.world.carried(held.hand, stance)
         self._known: dict[tuple[float, ...], list[tuple[_Region, np.ndarray]]] = {}
 
     def plan(self, spots: Sequence[DirtSpot]) -> _CleanPlan | None:
@@ -290,50 +324,74 @@ class _From:
         to none of the first ones."""
         far = self._world.body.reach + FAR
         spots = [s for s in spots if np.linalg.norm(s.pos[:2] - self._stance.xy) < far]
-        near = [(s, turn) for s in spots if (turn := self._turn(s)) >= 0]
-        left, strokes = [s for s, _ in near], list[_Stroke]()
-        turns = {s.number: turn for s, turn in near}
-        while left and len(strokes) < STROKES:
-            sets = []
-            for s in left:
-                region, _ = self._turned(s.normal)[turns[s.number]]
-                sets.append(region.covers(region.at(s), spots))
-            best = int(np.argmax([len(c) for c in sets]))
-            gone = {s.number for s in sets[best]} | {left[best].number}
-            taken = {s.number for stroke in strokes for s in stroke.covered}
-            own = [s for s in spots if s.number in gone - taken]
-            strokes.append(_Stroke(left[best], turns[left[best].number], own))
-            left = [s for s in left if s.number not in gone]
+        turns = self._turns(spots)
+        near = np.flatnonzero(turns >= 0)
+        if not len(near):
+            return None
+        roofed = self._roofed([spots[k] for k in near]) if self._loose else np.zeros(len(near), bool)
+        pos = np.array([s.pos for s in spots])
+        low, high = np.zeros((len(near), 3)), np.zeros((len(near), 3))
+        for row, k in enumerate(near):
+            region, _ = self._turned(spots[k].normal)[turns[k]]
+            grip = region.at(spots[k])
+            low[row], high[row] = grip + region.low - SLACK, grip + region.high + SLACK
+        covers = np.all((low[:, None] <= pos) & (pos <= high[:, None]), axis=-1)
+        covers[np.arange(len(near)), near] = True
+        left, strokes = np.ones(len(near), bool), list[_Stroke]()
+        taken = np.zeros(len(spots), bool)
+        while left.any() and len(strokes) < STROKES:
+            best = int(np.argmax(np.where(left, covers.sum(1) - HIDDEN * roofed, -np.inf)))
+            own = covers[best] & ~taken
+            spot = spots[near[best]]
+            strokes.append(_Stroke(spot, int(turns[near[best]]), [spots[k] for k in np.flatnonzero(own)], roofed[best]))
+            taken |= own
+            left &= ~covers[best][near]
         strokes = _one_after_another(strokes)
         if not any(self.way(stroke.spot, stroke.turn) for stroke in strokes[:FEW]):
             return None
         return _CleanPlan(self._stance, strokes)
 
+    def _roofed(self, spots: Sequence[DirtSpot]) -> Bool[np.ndarray, "n"]:
+        """Before which particles something is in the way of a tool that comes straight to the face."""
+        points = (
+            np.array([s.pos for s in spots])[:, None] + np.array([s.normal for s in spots])[:, None] * OPEN[:, None]
+        )
+        return (self._obstacles.distance(points) < ROOM).any(1)
+
     def _turned(self, normal: Vector) -> list[tuple[_Region, np.ndarray]]:
         """Turns of the tool for faces with a normal, and spheres of the hand with it."""
         key = tuple(np.round(normal, 2))
         if key not in self._known:
-            world, tool, hand = self._world, self._tool, self._hand
-            regions = _regions(world, tool, hand, self._stance.yaw, normal)
-            self._known[key] = [(r, _spheres(world, tool, hand, r)) for r in regions]
+            regions = _regions(self._held, self._stance.yaw, normal)
+            self._known[key] = [(r, self._held.spheres(r.rotation)) for r in regions]
         return self._known[key]
 
-    def _turn(self, spot: DirtSpot) -> int:
-        """The first turn of the tool in which the hand has room at a particle; -1: there is none."""
-        here = np.array(self._stance.xy)
-        to_robot = spot.normal[2] > 0.5 or (here - spot.pos[:2]) @ spot.normal[:2] > 0
-        if not to_robot and spot.pos[2] >= OVER_TOP:
-            return -1
-        for turn, (region, spheres) in enumerate(self._turned(spot.normal)):
-            if not self._world.reaches(self._hand, self._stance, region.at(spot)):
-                continue
-            if not self._obstacles.clear(spheres + np.array([*region.above(spot), 0.0])):
-                continue
-            if to_robot or self.way(spot, turn):  # over the rim of a bathtub to its near inner side
-                return turn
-            if turn >= OVERS:
-                break
-        return -1
+    def _turns(self, spots: Sequence[DirtSpot]) -> Int[np.ndarray, "n"]:
+        """The first turn of the tool in which the hand has room at each particle; -1: there is none."""
+        found = np.full(len(spots), -1)
+        here, shoulder = np.array(self._stance.xy), self._world.shoulder(self._hand, self._stance)
+        groups = collections.defaultdict[tuple, list[int]](list)
+        for k, s in enumerate(spots):
+            groups[tuple(np.round(s.normal, 2))].append(k)
+        for members in groups.values():
+            pos = np.array([spots[k].pos for k in members])
+            normal = np.array([spots[k].normal for k in members])
+            to_robot = (normal[:, 2] > 0.5) | (((here - pos[:, :2]) * normal[:, :2]).sum(1) > 0)
+            left = to_robot | (pos[:, 2] < OVER_TOP)
+            for turn, (region, spheres) in enumerate(self._turned(normal[0])):
+                if turn > OVERS:  # over the rim of a bathtub to its near inner side
+                    left &= to_robot
+                if not left.any():
+                    break
+                at = np.array([region.at(spots[k]) for k in members])
+                room = left & (np.linalg.norm(at - shoulder, axis=1) <= self._world.body.reach)
+                rows = np.flatnonzero(room)
+                room[rows] = self._obstacles.clear_at(spheres, at[rows] + region.lifted * normal[rows])
+                for row in np.flatnonzero(room & ~to_robot):
+                    room[row] = bool(self.way(spots[members[row]], turn))
+                found[np.array(members)[room]] = turn
+                left &= ~room
+        return found
 
     def way(self, spot: DirtSpot, turn: int) -> list[Vector] | None:
         """The hand's way to above a particle; None: there is none."""
@@ -346,35 +404,31 @@ class _From:
 
 def _one_after_another(strokes: list[_Stroke]) -> list[_Stroke]:
     """Upper sides first, from one place to the next."""
-    left = sorted(strokes, key=lambda stroke: (stroke.spot.normal[2] < 0.5, -round(float(stroke.spot.pos[2]), 1)))
+    left = sorted(strokes, key=lambda s: (s.roofed, s.spot.normal[2] < 0.5, -round(float(s.spot.pos[2]), 1)))
     ordered = left[:1]
     left = left[1:]
     while left:
-        level = [s for s in left if abs(s.spot.pos[2] - left[0].spot.pos[2]) < 0.1]
+        level = [s for s in left if s.roofed == left[0].roofed and abs(s.spot.pos[2] - left[0].spot.pos[2]) < 0.1]
         nearest = min(level, key=lambda s: float(np.linalg.norm(s.spot.pos - ordered[-1].spot.pos)))
         left.remove(nearest)
         ordered.append(nearest)
     return ordered
 
 
-def _spheres(world: PlannedWorld, tool: str, hand: int, region: _Region) -> Float[np.ndarray, "S 4"]:
-    axes = world.hand_axes(hand, region.rotation)
-    return world.spheres(*axes, holding=tool, hand=hand, rotation=region.rotation)
-
-
 def _program(world: PlannedWorld, tool: str, hand: int, stroke: _Stroke) -> Program:
     """Presses the tool on a particle and lifts it; nothing where the hand has no way there. The planned turn of the
     tool is tried first."""
     obstacles, stance, spot = world.obstacles([tool], world.stance), world.stance, stroke.spot
-    regions = _regions(world, tool, hand, stance.yaw, spot.normal)
+    held = _HeldTool(world, tool, hand)
+    regions = _regions(held, stance.yaw, spot.normal)
     planned = regions[min(stroke.turn, len(regions) - 1)]
     if world.body.opening is not None:
-        regions = [planned, *(_turned(world, tool, hand, planned, spot.normal, angle) for angle in TURNS)]
+        regions = [planned, *(_turned(held, planned, spot.normal, angle) for angle in TURNS)]
     ways = 0
     for region in [planned, *(r for r in regions if r is not planned)]:
         if not world.reaches(hand, stance, region.at(spot)):
             continue
-        spheres = _spheres(world, tool, hand, region)
+        spheres = held.spheres(region.rotation)
         if not obstacles.clear(spheres + np.array([*region.above(spot), 0.0])):
             continue
         follows = world.follows(hand, world.turned_hand(hand, region.rotation), obstacles)
@@ -388,17 +442,9 @@ def _program(world: PlannedWorld, tool: str, hand: int, stroke: _Stroke) -> Prog
     return []
 
 
-def _turned(world: PlannedWorld, tool: str, hand: int, region: _Region, normal: Vector, angle: float) -> _Region:
+def _turned(held: _HeldTool, region: _Region, normal: Vector, angle: float) -> _Region:
     """The same tool turned about the normal of a face, rad."""
-    area, _ = cleaning_area(world, tool)
-    points = (world.vertices(tool) if area is None else area) - world.grip(hand)
-    return _Region.turned(_about(normal, angle) @ region.rotation, points)
-
-
-def _back(world: PlannedWorld, hand: int) -> Program:
-    """Lifts the tool off where it was pressed, to where the hand carries it: ways are planned from there."""
-    up = vector3(world.grip(hand) + RAISED * UP)
-    return [Phase(hand=hand, pos=up, tolerance=0.04, limit=15, after=""), carry(world, hand)]
+    return _Region.turned(_about(normal, angle) @ region.rotation, held.corners)
 
 
 def _press(

@@ -15,7 +15,7 @@ import itertools
 from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.poses import matrices_on_host
@@ -156,6 +156,45 @@ class Obstacles:
         piece = near[piece]
         away = np.einsum("pni,pi->pn", self._normal[piece], centre[sphere]) - self._offset[piece]
         return bool((away.max(-1, initial=-1.0) >= radius[sphere, 0]).all())
+
+    def clear_at(
+        self, spheres: Float[np.ndarray, "S 4"], points: Float[np.ndarray, "M 3"], together: int = 64
+    ) -> Bool[np.ndarray, "M"]:
+        """At which points spheres (x, y, z from the point; radius) enter no piece: `clear` for each of many places.
+
+        Args:
+          together: points that are looked at at once.
+        """
+        found = np.ones(len(points), bool)
+        for first in range(0, len(points), together):
+            part = points[first : first + together]
+            centre = (part[:, None] + spheres[None, :, :3]).reshape(-1, 3)
+            radius = np.tile(spheres[:, 3], len(part))
+            bad = self._enters(centre, radius)
+            found[first : first + together] = ~bad.reshape(len(part), -1).any(1)
+        return found
+
+    def _enters(self, centre: Float[np.ndarray, "N 3"], radius: Float[np.ndarray, "N"]) -> Bool[np.ndarray, "N"]:
+        """Which spheres enter a piece, or the body."""
+        bad = np.zeros(len(centre), bool)
+        if self._body is not None:
+            x, y, wide, high = self._body
+            held = (radius < HELD) & (centre[:, 2] < high)
+            bad |= held & (np.hypot(centre[:, 0] - x, centre[:, 1] - y) < wide + radius)
+        wide = radius[:, None]
+        low, high = (centre - wide).min(0), (centre + wide).max(0)
+        near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
+        if not len(near):
+            return bad
+        meets = np.ones((len(centre), len(near)), bool)
+        for axis in range(3):
+            meets &= (centre[:, axis, None] - wide) < self._high[near, axis]
+            meets &= (centre[:, axis, None] + wide) > self._low[near, axis]
+        sphere, piece = np.nonzero(meets)
+        piece = near[piece]
+        away = np.einsum("pni,pi->pn", self._normal[piece], centre[sphere]) - self._offset[piece]
+        bad[sphere[away.max(-1, initial=-1.0) < radius[sphere]]] = True
+        return bad
 
     def entries(
         self, origins: Float[np.ndarray, "R 3"], directions: Float[np.ndarray, "R 3"], of: int, body: int | None = None

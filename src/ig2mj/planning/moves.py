@@ -181,6 +181,9 @@ def rest(hand: int) -> Program:
 STRAYED, RAISED_OFF = 0.15, 0.1
 """m from where a hand rests, or carries what it holds, beyond which it has strayed; by which it is raised first."""
 
+TOUCHES = 0.3
+"""Share of the spheres' radii that keeps clear of others where a hand with what it holds touches something."""
+
 Found = TypeVar("Found")
 
 
@@ -191,11 +194,37 @@ def strayed(world: PlannedWorld, hand: int) -> bool:
 
 
 def go_home(world: PlannedWorld, hand: int) -> Program:
-    """A hand goes back to where it rests or, if it holds something, carries that; raised first, off what it is at."""
-    if not world.held[hand]:
-        return rest(hand)
+    """A hand goes back to where it rests or, if it holds something, carries that: on a way that is free or, where none
+    is found, raised first, off what it is at."""
+    name = world.held[hand]
+    home = [carry(world, hand)] if name else rest(hand)
+    way = _way_home(world, hand, name) if world.body.opening is None else None
+    if way is not None:
+        return [*travel(hand, way, None), *home]
     up = vector3(world.grip(hand) + RAISED_OFF * UP)
-    return [Phase(hand=hand, pos=up, tolerance=0.04, limit=15, after=""), carry(world, hand)]
+    return [Phase(hand=hand, pos=up, tolerance=0.04, limit=15, after=""), *home] if name else home
+
+
+def go_home_past(world: PlannedWorld, hand: int, came: Sequence[Vector]) -> Generator[Program, str, None]:
+    """As `go_home`; where no way home is free, the hand first goes back the way that it came to where it is."""
+    if came and world.body.opening is None and _way_home(world, hand, world.held[hand]) is None:
+        yield travel(hand, came[-2::-1], None)
+    yield go_home(world, hand)
+
+
+def _way_home(world: PlannedWorld, hand: int, name: str) -> list[Vector] | None:
+    """Points between where a floating hand is, turned as it is, and where it rests or carries what it holds."""
+    stance = world.stance
+    start = world.carried(hand, stance) if name else world.resting(hand, stance)
+    obstacles, grip = world.obstacles([name] if name else [], stance), world.grip(hand)
+    spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
+    back = [UP, -ahead(stance.yaw)]
+    for share in (1.0, TOUCHES):
+        there = spheres * (1.0, 1.0, 1.0, share)
+        way = hand_path(obstacles, there, start, grip, back, search=obstacles.clear(there + np.array([*grip, 0.0])))
+        if way is not None:
+            return way[-2::-1]
+    return None
 
 
 def from_home(
