@@ -63,8 +63,8 @@ FINGERS = 0.12
 UPRIGHT = 0.5
 """Horizontal part of the normal of a face from which on the robot stands in front of it: not of a lid's."""
 
-WIDE, TRIES = 0.5, 2
-"""Share of a joint's range from which on it is not in the way of a hand, and times that it is moved out of the way."""
+WIDE, FAR_OUT, TRIES = 0.5, 0.8, 2
+"""Shares of its range from which on a door, and a drawer, is not in the way of a hand, and times that it is moved out of the way."""
 
 LIFTED, HOOKED = 0.2, 12
 """Share of its range from which on a lid's inner face is pushed; agent steps in which fingers get below its edge."""
@@ -153,7 +153,7 @@ def _move_one(
     """Opens the first that is not wide open, else shuts the first that is open."""
     if all(world.held):
         return False
-    shut = [j for j in opened if j.fraction < WIDE and tried[j.name] < TRIES]
+    shut = [j for j in opened if j.fraction < (WIDE if j.hinge else FAR_OUT) and tried[j.name] < TRIES]
     out = [j for j in closed if j.fraction > AJAR and tried[f"{j.name} shut"] < TRIES]
     if not shut and not out:
         return False
