@@ -64,7 +64,8 @@ UPRIGHT = 0.5
 """Horizontal part of the normal of a face from which on the robot stands in front of it: not of a lid's."""
 
 WIDE, FAR_OUT, TRIES = 0.5, 0.8, 2
-"""Shares of its range from which on a door, and a drawer, is not in the way of a hand, and times that it is moved out of the way."""
+"""Shares of their ranges from which on a door, and a drawer, is not in the way of a hand, and times that it is moved
+out of the way."""
 
 LIFTED, HOOKED = 0.2, 12
 """Share of its range from which on a lid's inner face is pushed; agent steps in which fingers get below its edge."""
@@ -80,8 +81,9 @@ ARM_SWING, ARM_MOVES = 0.35, 14
 """Share of a joint's range by which an arm moves it from one stance where it does not follow it to its end; and such
 moves for one primitive."""
 
-STANCES, WAYS = 20, 12
-"""Stances for each grip, and ways of a hand that are looked for with one kind of grip, at most."""
+STANCES, WAYS, ARM_WAYS = 20, 6, 12
+"""Stances for each grip, and ways of a hand that are looked for, at most: of one that floats with each grip, and of one
+on an arm with one kind of grip."""
 
 
 def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
@@ -252,12 +254,13 @@ def _plan(
     world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int, to: float = OPEN_TO
 ) -> _JointPlan | None:
     floor, obstacles = world.floor(), world.obstacles()
-    passed, ways = 0, _ways(world, joint, value, to)
-    steps = (1.0,) if world.body.opening is None else (1.0, ARM_SWING)
+    passed, ways, floats = 0, _ways(world, joint, value, to), world.body.opening is None
+    steps = (1.0,) if floats else (1.0, ARM_SWING)
     for step, (grips, end, pulls) in itertools.product(steps, ways):
         fraction = min(end, joint.fraction + step) if value else max(end, joint.fraction - step)
         count, sweep = 0, joint.sweep(fraction)[:, :2]
         for grip in grips:
+            count = 0 if floats else count
             places = joint.path(grip, fraction)
             first, normal = places[0]
             upright = grips is not joint.edges and float(np.linalg.norm(normal[:2])) > UPRIGHT
@@ -269,7 +272,7 @@ def _plan(
                 if stance is None:
                     continue
                 count += 1
-                if count > WAYS:
+                if count > (WAYS if floats else ARM_WAYS):
                     break
                 spheres = world.spheres(_fingers(joint, places[0], pulls, hand), -normal)
                 before = first + ABOVE * normal
