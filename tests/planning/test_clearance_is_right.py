@@ -90,3 +90,13 @@ def test_free_cells_have_room_and_taken_ones_have_not(query, seed):
     free = floor.free[tuple(cells.T)]
     assert (away[free] >= radius).all()
     assert (away[~free] <= radius + CLEARANCE + 2 * RESOLUTION).all()
+
+
+def test_many_places_at_once_are_as_clear_as_one_after_another(query):
+    rng = np.random.default_rng(3)
+    obstacles = Obstacles(query.scene, query.view, 0).about((-0.5, 0.2), 0.3, 1.5)
+    spheres = np.array([[0.0, 0.0, 0.0, 0.03], [0.1, 0.0, 0.02, 0.03], [0.0, 0.15, 0.0, 0.012]])
+    points = rng.uniform((-2.0, -2.0, 0.0), (2.0, 2.0, 1.2), (150, 3))
+    each = [obstacles.clear(spheres + np.array([*p, 0.0])) for p in points]
+    assert obstacles.clear_at(spheres, points).tolist() == each
+    assert 0 < sum(each) < len(each)

@@ -1,5 +1,7 @@
 """A body that hovers stretches and stoops where a program asks it to, and stays so until another one asks."""
 
+import types
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,8 @@ from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles, hand_way
 from ig2mj.planning.driving import stretch
 from ig2mj.planning.phases import Phase, Programs
+from ig2mj.planning.stances import reaching_all
+from ig2mj.planning.world import PlannedWorld, Stance
 from ig2mj.sampling.query import SceneQuery
 
 
@@ -48,9 +52,39 @@ class _Roof(Obstacles):
         x, _, z, radius = spheres.T
         return not ((x + radius > 0) & (np.abs(z) < radius)).any()
 
+    def distance(self, points):
+        return np.full(points.shape[:-1], 0.3)
+
 
 def test_a_hand_goes_level_below_what_is_above_its_goal():
     ball = np.array([[0.0, 0.0, 0.0, 0.05]])
     start, goal = np.array([-0.4, 0.0, 0.4]), np.array([0.3, 0.0, -0.2])
     way = hand_way(_Roof(), ball, start, goal)
     assert way is not None and np.allclose(way, [[-0.4, 0.0, -0.2], goal])
+
+
+class _Shoulder(PlannedWorld):
+    """A robot with its shoulder 0.85 m above the floor where it stands, with room above it."""
+
+    def __init__(self):
+        self.body = types.SimpleNamespace(reach=1.15, rises=(-0.3, 0.25), stands=0.55)
+
+    def shoulder(self, hand, stance):
+        return np.array([*stance.xy, 0.85 + stance.rise])
+
+
+def test_the_body_stretches_as_little_as_it_takes_to_reach_all_points():
+    world, here = _Shoulder(), Stance((0.0, 0.0), 0.0)
+
+    def reached(*points):
+        return reaching_all(world, 0, here, np.array(points, float), _Roof())
+
+    near, low, high = (0.8, 0.0, 0.9), (0.9, 0.0, 0.05), (0.0, 0.7, 1.85)
+    level = reached(near)
+    assert level is not None and level.rise == 0.0
+    for points in ((near, low), (near, high)):
+        found = reached(*points)
+        assert found is not None
+        away = [np.linalg.norm(world.shoulder(0, found) - p) for p in points]
+        assert max(away) <= world.body.reach + 1e-9 and np.isclose(max(away), world.body.reach)
+    assert reached(low, high) is None and reached((1.3, 0.0, 0.9)) is None

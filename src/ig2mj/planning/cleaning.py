@@ -207,6 +207,10 @@ class _Region:
         """Grasp point of the hand right before."""
         return self.at(spot) + self.lifted * spot.normal
 
+    def box(self, grip: Vector) -> tuple[Vector, Vector]:
+        """Lower and upper corner of what it cleans with the hand's grasp point at a place."""
+        return grip + self.low - SLACK, grip + self.high + SLACK
+
 
 class _HeldTool:
     """A tool as a hand holds it now: the part that cleans, and spheres of hand and tool, m from the grasp point."""
@@ -333,8 +337,7 @@ class _From:
         low, high = np.zeros((len(near), 3)), np.zeros((len(near), 3))
         for row, k in enumerate(near):
             region, _ = self._turned(spots[k].normal)[turns[k]]
-            grip = region.at(spots[k])
-            low[row], high[row] = grip + region.low - SLACK, grip + region.high + SLACK
+            low[row], high[row] = region.box(region.at(spots[k]))
         covers = np.all((low[:, None] <= pos) & (pos <= high[:, None]), axis=-1)
         covers[np.arange(len(near)), near] = True
         left, strokes = np.ones(len(near), bool), list[_Stroke]()

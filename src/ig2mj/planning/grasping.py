@@ -20,7 +20,9 @@ from ig2mj.planning.moves import (
     COMING,
     GRIPPING,
     NEAR,
+    OPENS,
     RETREAT,
+    THIN,
     TOUCHING,
     UP,
     Primitive,
@@ -129,12 +131,13 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
         return "no_path", f"the hand has no path to {name}"
     lift = LIFT * UP * float(pose.palm @ UP > -0.9)
     deep, floats = vector3(pose.at(-BELOW)), world.body.opening is None
+    thin = floats and float(np.ptp(world.vertices(name) @ pose.palm)) < THIN
     near = Phase(hand=hand, pos=vector3(pose.at(NEAR)), quat=quat, tolerance=0.01, limit=12, after="", speed=COMING)
     reason = yield [
         *travel(hand, way, quat),
-        *([near] if floats else []),
+        *([near] if thin else []),
         Phase(hand=hand, pos=deep, quat=quat, until=Until.TOUCHED, object=index, close=False, limit=25, after="",
-              speed=TOUCHING if floats else COMING),
+              speed=TOUCHING if thin else COMING),
         Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15, after="no_grasp",
               speed=CLOSING if floats else GRIPPING),
         *([Phase(hand=hand, pos=deep, close=True, until=Until.WAITED, limit=FIRM)] if world.body.friction else []),
@@ -143,7 +146,7 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
         Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=True, tolerance=0.04, limit=30, after="",
               speed=0.03),
         *travel(hand, [p + lift for p in way[-2::-1]], None, keeps=index),
-        carry(world, hand, keeps=index, name=name),
+        carry(world, hand, keeps=index, name=name, at=pose.point),
     ]  # fmt: skip
     if name in world.held:
         return "", ""
@@ -242,6 +245,7 @@ def release(world: PlannedWorld, step: Step) -> Primitive:
     reason = yield [
         *lowered,
         Phase(hand=hand, close=False, until=Until.EMPTY, limit=15),
+        Phase(hand=hand, close=False, until=Until.WAITED, limit=OPENS),
         Phase(hand=hand, pos=off, tolerance=0.04, limit=15, after=""),
         *rest(hand),
     ]

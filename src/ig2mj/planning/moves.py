@@ -34,12 +34,15 @@ CLOSING, GRIPPING = 0.006, 0.02
 """m in an agent step by which a closing hand goes on, and a gripper on an arm: a floating hand's targets behind a
 surface add up, and small things that are pressed on their support are shot out."""
 
-NEAR, COMING, TOUCHING = 0.025, 0.03, 0.01
-"""m before an object from which on a floating hand comes slowly to it, m in an agent step until then, and from there:
-what is thin would be between its fingers and the back of the hand before they close, or shot out below it."""
+THIN, NEAR, COMING, TOUCHING = 0.04, 0.025, 0.03, 0.01
+"""m: what is thinner, a floating hand comes slowly to, from how far before it, and m in an agent step until then, and
+from there: else it would be behind the palm before the fingers close, or shot out below it."""
 
 LET_GO = 0.015
 """m above its place at which an object is let go."""
+
+OPENS = 3
+"""Agent steps in which the fingers of a hand that has let go come off what it held."""
 
 RETREAT = 0.12
 """m that a hand goes back after it has let go."""
@@ -167,9 +170,16 @@ def turn_at(world: PlannedWorld, hand: int, point: Vector, quat, keeps: int = -1
     return [dataclasses.replace(there, quat=None), there]
 
 
-def carry(world: PlannedWorld, hand: int, keeps: int = -1, name: str = "") -> Phase:
+def carry(world: PlannedWorld, hand: int, keeps: int = -1, name: str = "", at: Vector | None = None) -> Phase:
+    """A hand goes to where it carries what it holds, or is about to hold: `name`, by a point of it, `at`."""
     return Phase(
-        hand=hand, pos=vector3(world.carry(hand, name)), in_body=True, keeps=keeps, tolerance=0.08, limit=40, after=""
+        hand=hand,
+        pos=vector3(world.carry(hand, name, at)),
+        in_body=True,
+        keeps=keeps,
+        tolerance=0.08,
+        limit=40,
+        after="",
     )
 
 

@@ -17,6 +17,7 @@ from ig2mj.planning.grasping import grasp
 from ig2mj.planning.moves import (
     ATTEMPTS,
     LET_GO,
+    OPENS,
     OVER,
     RETREAT,
     UP,
@@ -55,6 +56,10 @@ DROPS = {"inside": DEEP_DROPS, "on_top": LOW_DROPS, "on_floor": LOW_DROPS, "next
 
 FALLS_OVER, FALLING = ("on_floor", "on_top", "inside"), 15
 """Placements that stay true where an object falls over, and agent steps that it falls."""
+
+UNDER = 0.85
+"""m, horizontal, that a base would like to be from what is put below something: it is let down before that, and goes
+straight in."""
 
 STANCES, WAYS, ARM_WAYS = 3, 30, 200
 """Stances for each spot, and ways of a hand that are looked for, at most: of one that floats, and of one on an arm."""
@@ -104,6 +109,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 Phase(hand=hand, pos=vector3(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1,
                       limit=20, after="", speed=0.03),
                 Phase(hand=hand, close=False, until=Until.EMPTY, limit=10),
+                Phase(hand=hand, close=False, until=Until.WAITED, limit=OPENS),
                 Phase(hand=hand, pos=vector3(target - RETREAT * palm), tolerance=0.04, limit=15, after=""),
                 *travel(hand, [*way[-2::-1], start], None),
                 *rest(hand),
@@ -266,7 +272,8 @@ def _plan(
         for spot, target, spheres in spots():
             lacking = _NO_STANCE if lacking == _NO_WAY and not seen else lacking
             palm = world.hand_axes(hand, grip_for(world, hand, name, spot)[2])[1]
-            for stance in stances(world, hand, target, floor, world.away(spheres), most=STANCES):
+            away = max(world.away(spheres), UNDER if predicate == "under" else 0.0)
+            for stance in stances(world, hand, target, floor, away, most=STANCES):
                 lacking = _NO_WAY
                 if points_ahead(world, palm, stance.yaw):
                     seen.append(stance)

@@ -1,0 +1,66 @@
+"""A base that moves in any direction turns only where there is room for what its hands hold."""
+
+import types
+
+import numpy as np
+
+from ig2mj.planning.carrying import carried_way
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.world import PlannedWorld
+
+
+class _Corridor(Obstacles):
+    """Walls along x at y = -0.5 and 0.5 m up to x = 2, and open floor beyond."""
+
+    def __init__(self, opens: bool):
+        self._end = 2.0 if opens else np.inf
+
+    def clear(self, spheres):
+        x, y, _, radius = spheres.T
+        return not ((x < self._end) & (np.abs(y) + radius > 0.5)).any()
+
+
+class _World(PlannedWorld):
+    """A robot at the origin that looks along x and holds a rod of 0.9 m before it."""
+
+    def __init__(self, opens: bool = True):
+        self._corridor = _Corridor(opens)
+        self.domain = types.SimpleNamespace(fixed=lambda name: False)  # pyright: ignore[reportAttributeAccessIssue]
+
+    @property
+    def base(self):
+        return np.zeros(2), 0.0
+
+    @property
+    def held(self):
+        return ["rod"]
+
+    def obstacles(self, without=(), at=None):
+        assert list(without) == ["rod"]
+        return self._corridor
+
+    def hand_axes(self, hand, rotation=None):
+        return np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0])
+
+    def grip(self, hand):
+        return np.array([0.4, 0.0, 1.0])
+
+    def spheres(self, fingers, palm=(0.0, 0.0, -1.0), holding="", hand=0, rotation=None):
+        return np.array([[x, 0.0, 0.0, 0.02] for x in np.linspace(0.0, 0.9, 10)])
+
+
+POINTS = np.array([[0.0, 0.0], [3.5, 0.0]])
+
+
+def test_what_is_held_is_turned_where_the_corridor_ends():
+    way = carried_way(_World(), POINTS, np.pi / 2)
+    assert way is not None
+    assert way[-1].xy == (3.5, 0.0) and np.isclose(way[-1].yaw, np.pi / 2)
+    turned = [s for s in way if abs(s.yaw) > 0.5]
+    assert turned and all(s.xy[0] >= 2.0 for s in turned)
+
+
+def test_there_is_no_way_that_turns_in_a_corridor_without_end():
+    assert carried_way(_World(opens=False), POINTS, np.pi / 2) is None
+    straight = carried_way(_World(opens=False), POINTS, 0.0)
+    assert straight is not None and len({round(s.yaw, 6) for s in straight}) == 1
