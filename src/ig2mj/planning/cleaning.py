@@ -356,10 +356,9 @@ class _From:
 
     def _roofed(self, spots: Sequence[DirtSpot]) -> Bool[np.ndarray, "n"]:
         """Before which particles something is in the way of a tool that comes straight to the face."""
-        points = (
-            np.array([s.pos for s in spots])[:, None] + np.array([s.normal for s in spots])[:, None] * OPEN[:, None]
-        )
-        return (self._obstacles.distance(points) < ROOM).any(1)
+        pos, normal = np.array([s.pos for s in spots]), np.array([s.normal for s in spots])
+        away = self._obstacles.distance(pos[:, None] + normal[:, None] * OPEN[:, None])
+        return np.asarray(away.min(axis=1) < ROOM)
 
     def _turned(self, normal: Vector) -> list[tuple[_Region, np.ndarray]]:
         """Turns of the tool for faces with a normal, and spheres of the hand with it."""
