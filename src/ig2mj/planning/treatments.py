@@ -10,6 +10,7 @@ import numpy as np
 
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.planning.driving import go
+from ig2mj.planning.grasping import grasp
 from ig2mj.planning.moves import (
     ATTEMPTS,
     DOWN,
@@ -273,10 +274,13 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
         if world.facts.holds("sliced", name):
             return Outcome(attempts=max(attempt, 1))
         if knife not in world.held:
-            return Outcome("slipped", f"the hand lost {knife}", attempts=attempt)
+            again = yield from grasp(world, Step("grasp", (knife,)))
+            if not again.done:
+                return Outcome("slipped", f"the hand lost {knife}", attempts=attempt)
+            hand = hand_with(world, knife)
         top = np.array([*world.com(name)[:2], world.vertices(name)[:, 2].max()])
         points = [top + CUT_ABOVE * UP]
-        holds = lambda points=points: _holds_at(world, knife, hand, points, int(links[0]))  # noqa: E731
+        holds = functools.partial(_holds_at, world, knife, hand, points, int(links[0]))
         reason, way, _ = yield from _hold_at(world, knife, hand, holds)
         if reason:
             continue
