@@ -38,3 +38,16 @@ def test_recordings_without_a_plan_have_no_video_of_it(tmp_path, capsys):
     assert "was not recorded by a planner" in capsys.readouterr().err
     assert call(["demos", "video", "runs.h5", "--speed", "0", *out]) == 2
     assert "--speed is above 0" in capsys.readouterr().err
+
+
+def test_an_interruption_names_only_files_that_are_there(tiny_home_folder, tmp_path, capsys, monkeypatch):
+    from ig2mj.cli import solve
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+        yield
+
+    monkeypatch.setattr(solve, "_physical", interrupted)
+    call(["solve", str(tiny_home_folder), GOAL, "--record", str(tmp_path / "runs.h5")])
+    error = capsys.readouterr().err
+    assert "0 of 1 episodes are done" in error and "holds what was done" not in error

@@ -129,6 +129,8 @@ def test_a_server_that_takes_too_long_is_reported():
 def test_addresses_that_are_none_are_refused():
     with pytest.raises(UnknownNameError, match=r"'wss'.*near matches: ws"):
         connect("wss://localhost:1")
+    with pytest.raises(InputError, match="`ig2mj evaluate FILE` takes a policy's file"):
+        connect("policy.npz")
     with pytest.raises(InputError, match="no host and port"):
         connect("ws://localhost")
     with pytest.raises(PolicyServerError, match="no policy server answers"):

@@ -123,7 +123,7 @@ def run(
             for number, result in solved:
                 results.add(number, result)
     except KeyboardInterrupt:
-        kept = [f"{file} holds what was done" for file in (out, record) if file is not None]
+        kept = [f"{file} holds what was done" for file in (out, record) if file is not None and file.exists()]
         print("; ".join([f"{len(results.kept)} of {episodes} episodes are done", *kept]), file=sys.stderr)
         raise
     numbers = [n for n in sorted(results.kept) if n < episodes]

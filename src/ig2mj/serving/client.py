@@ -72,9 +72,12 @@ def connect(address: str, worlds: int = 1, timeout: float = TIMEOUT) -> PolicySe
       UnknownNameError: no such protocol. InputError: no address. MissingDependencyError: a package is missing.
       PolicyServerError: no server answers there.
     """
+    if "://" not in address:
+        fix = "write ws://HOST:PORT; `ig2mj evaluate FILE` takes a policy's file"
+        raise InputError(address, "is no address of a policy server", fix=fix)
     parsed = urllib.parse.urlsplit(address)
     if parsed.scheme not in PROTOCOLS:
-        raise UnknownNameError("protocol of policy servers", parsed.scheme or address, PROTOCOLS)
+        raise UnknownNameError("protocol of policy servers", parsed.scheme, PROTOCOLS)
     try:
         host, port = parsed.hostname, parsed.port
     except ValueError as e:

@@ -60,7 +60,7 @@ def simulate(step: Callable[[int], object], seconds: float, period: float) -> No
     part = max(1, round(PART / period))
     with progress("simulating") as report:
         while done < total:
-            report(done, total, f"{done * period:.0f} of {seconds:g} s")
+            report(done, total, f"{done * period:.0f} of {total * period:.0f} s")
             count = min(part, total - done)
             step(count)
             done += count
