@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import os
+import pkgutil
 import subprocess
 import sys
 
@@ -66,3 +67,16 @@ def test_a_variable_that_mujoco_refuses_is_a_user_s_error():
 def test_importing_ig2mj_loads_neither_jax_nor_mujoco():
     code = "import sys, ig2mj; sys.exit(bool({'jax', 'mujoco', 'warp'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_help_of_a_public_name_says_what_it_is():
+    found = [
+        importlib.import_module(f"ig2mj.{info.name}") for info in pkgutil.iter_modules(ig2mj.__path__) if info.ispkg
+    ]
+    told = {}
+    for package in (ig2mj, *found):
+        for name in getattr(package, "__all__", ()):
+            if callable(thing := getattr(package, name)):
+                told[f"{package.__name__}.{name}"] = (getattr(thing, "__doc__", "") or "").strip()
+    assert len(told) > 100
+    assert [name for name, text in told.items() if not text or text.startswith("See the module")] == []

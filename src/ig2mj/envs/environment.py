@@ -62,7 +62,13 @@ Companions = Callable[[UInt[Array, "W 2"], Int[Array, "W"]], Float[Array, "W m"]
 
 @entry_point
 class Environment(StateCopies, StateImages, Instructed, Configured):
-    """See the module's text; `ig2mj.make` makes one.
+    """A task in a batch of worlds; `ig2mj.make` makes one.
+
+        state = env.reset(0)
+        state = env.step(state, action)              # action: [W, n], -1..1
+        state = env.reset(state, state.terminated | state.truncated)
+
+    `step` and `reset` consume the state that they are given: continue with the one that is returned. `fork` copies one.
 
     Attributes:
       task, robot, grasping: what is done by whom, and how hands hold (`ig2mj.agents.grasping.MODES`).

@@ -58,7 +58,7 @@ class _World:
 
 
 class LeRobotVectorEnv(GymVectorEnv):
-    """See the module's text."""
+    """Many worlds as LeRobot evaluates them: pixels by camera, and `agent_pos`, the robot's proprioception."""
 
     def __init__(self, task: str, n_envs: int = 1, cameras: Sequence[str] = (HEAD,), **options: Any):
         """

@@ -57,7 +57,7 @@ _FROM_WORLD = (
 
 
 class Visual:
-    """See the module's text.
+    """The model of a scene as it is seen, and data of it at the poses of a world.
 
     Attributes:
       model: the scene's model and what is added; the scene's own where the looks are plain.

@@ -19,7 +19,10 @@ from ig2mj.worlds.pool import Pool
 
 @entry_point
 class BatchAgent:
-    """See the module's text. Attributes: rung: what carries out its primitives, in the worlds of `rung.stage`."""
+    """One robot in many worlds of the native engine, which carries out a primitive in all of them: `of_scene`, `do`.
+
+    Attributes: rung: what carries out its primitives, in the worlds of `rung.stage`.
+    """
 
     def __init__(self, stage: Stage, seed: int = 0):
         """Raises PlanningError: the robot has no base that planned ways can move."""

@@ -80,7 +80,9 @@ class _KinematicWorld(PlannedWorld):
 
 
 class KinematicRung:
-    """See the module's text and `ig2mj.planning.rung.Rung`.
+    """Primitives whose motion is planned and checked as in physics, and whose result is set; no time passes.
+
+    Its methods: `ig2mj.planning.rung.Rung`.
 
     Attributes:
       domain: constants, as primitives see them. body: how programs move the robot.

@@ -45,7 +45,9 @@ def check_robot(robot: str | TaskRobot) -> None:
 
 
 class PhysicsRung:
-    """See the module's text and `ig2mj.planning.rung.Rung`.
+    """Primitives carried out by a robot's actions, in all worlds of a stage together.
+
+    Its methods: `ig2mj.planning.rung.Rung`.
 
     Attributes:
       stage: the worlds. body: how programs move the robot; one without planned hands carries out `navigate_to`.

@@ -38,7 +38,7 @@ from ig2mj.worlds.pool import Pool
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Problem:
-    """See the module's text.
+    """A household, a goal in it, and start states; `problem_of` makes one.
 
     Attributes:
       name: of the activity, or of the scene. scene: without robots. model: of its states. goal: compiled for the scene.

@@ -45,7 +45,10 @@ class _SymbolicWorld:
 
 
 class SymbolicRung:
-    """See the module's text and `ig2mj.planning.rung.Rung`."""
+    """Primitives as changes of states, without motion, by the samplers and setters of `ig2mj.sampling`.
+
+    Its methods: `ig2mj.planning.rung.Rung`.
+    """
 
     name = "symbolic"
 

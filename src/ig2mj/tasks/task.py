@@ -169,7 +169,7 @@ class Physical:
 
 @dataclasses.dataclass(frozen=True)
 class Task:
-    """See the module's text.
+    """What is to be done in a home, as data: what its start states fulfil, a goal, a reward, and robots.
 
     Attributes:
       name: as `ig2mj.make` takes it. summary: one sentence.

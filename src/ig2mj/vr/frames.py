@@ -92,7 +92,7 @@ class Hand:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PoseFrame:
-    """See the module's text.
+    """What a person's devices say at one instant: metres and w-x-y-z in the play area's frame, z up.
 
     Attributes:
       time: s, of the source's own clock.

@@ -104,7 +104,9 @@ PEDESTAL = (0.06, 0.25)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class UrdfRobot(TaskRobot):
-    """See the module's text.
+    """A robot of one's own in a scene, from the folder that `ig2mj convert robot` wrote of a URDF or an MJCF file.
+
+    Every motor is a servo with the file's limits of force and speed.
 
     Attributes:
       folder: what the converter wrote. name: of the agent; the converted robot's, or another.

@@ -35,7 +35,10 @@ class NoStart(Exception):
 
 
 class StartWorld:
-    """See the module's text. Attributes: scene: the household."""
+    """The household in one world without robots, in which a task's `start` makes one start state.
+
+    Attributes: scene: the household.
+    """
 
     def __init__(self, sampler: RowSampler, rng: np.random.Generator):
         """Binds a sampler, whose world is at the scene's start, and the random numbers of this attempt."""
