@@ -15,9 +15,11 @@ OF_XLA = jax.errors.JaxRuntimeError(
     "RESOURCE_EXHAUSTED: Out of memory while trying to allocate 687194767360 bytes.\n" + 300 * "allocator statistics "
 )
 OF_WARP = RuntimeError("Failed to allocate 5 bytes on device 'cuda:0'")
+OF_SYSTEM = OSError(12, "Cannot allocate memory")
+OF_LOADER = ImportError("libgfortran.so.5: failed to map segment from shared object")
 
 
-@pytest.mark.parametrize("error", [OF_XLA, OF_WARP, MemoryError()])
+@pytest.mark.parametrize("error", [OF_XLA, OF_WARP, OF_SYSTEM, OF_LOADER, MemoryError()])
 def test_errors_of_all_allocators_are_known_and_become_one_short_line(error):
     assert is_out_of_memory(error) and not is_out_of_memory(RuntimeError("a shape is wrong"))
     line, status = describe_error(error)

@@ -163,7 +163,7 @@ def describe_error(error: Exception) -> tuple[str, int]:
         return " ".join(str(error).split()), 2
     if isinstance(error, ModuleNotFoundError) and error.name and not error.name.startswith("ig2mj"):
         return f"the Python package '{error.name}' is not installed ({pip_install_module(error.name)})", 2
-    if isinstance(error, OSError):
+    if isinstance(error, OSError) and not is_out_of_memory(error):
         name = error.filename or _written(error)
         where = f"{name}: " if name else ""
         return f"{where}{error.strerror or error}", 2

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-OUT_OF_MEMORY = ("RESOURCE_EXHAUSTED", "Out of memory", "Failed to allocate")
-"""What XLA's and Warp's errors say, which have no type of their own."""
+OUT_OF_MEMORY = (
+    "RESOURCE_EXHAUSTED",
+    "Out of memory",
+    "Failed to allocate",
+    "Cannot allocate memory",
+    "failed to map segment from shared object",
+)
+"""What errors of XLA, Warp, the system and its loader of libraries say, which have no type of their own."""
 
 REMEDY = (
     "use fewer worlds, smaller images or fewer of them, or end other programs that use this device "
