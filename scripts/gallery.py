@@ -5,6 +5,7 @@ python scripts/gallery.py [rooms|homes|robots|states|night ...]
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 import sys
 
@@ -56,8 +57,9 @@ def rooms() -> None:
         scene = load_scene(home)
         tiles.append(tile(scene, room_view(scene, name), f"{kind.replace('_', ' ')} ({home})"))
     sheet(tiles, 4).save(FOLDER / "gallery_rooms.jpg", quality=QUALITY)
-    scene = load_scene("rowan")
-    tile(scene, room_view(scene, "living_room_0", 58.0), "", (960, 540)).save(FOLDER / "room.jpg", quality=QUALITY)
+    scene = load_scene("birch")
+    view = dataclasses.replace(room_view(scene, "living_room_0"), fovy=56.0)
+    tile(scene, view, "", (960, 540)).save(FOLDER / "room.jpg", quality=QUALITY)
 
 
 def homes() -> None:
