@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import jax
 import numpy as np
+import pytest
+from hand_world import Item
 from substance_world import tilted, world
 
 from ig2mj.predicates import compile_expression
@@ -47,3 +49,27 @@ def test_flow_is_that_of_the_rules_without_whole_steps(monkeypatch):
     assert not holds[0] and holds[-1] and float(ours.lost.sum()) > 0.1
     assert np.asarray(coat.covered(model, ours))[0, FLOOR, model.substances.names.index(SOAP)]
     assert len(whole) <= 3, "one at the start, and one where each stream begins"
+
+
+@pytest.mark.slow
+def test_what_moves_elsewhere_leaves_the_steps_ahead_valid(monkeypatch):
+    home = world(Item("block", (((0, 0, 0), (0.04, 0.04, 0.04)),), pos=(-2, -2, 0.04)))
+    model = home.model()
+    rules = Rules(model, compile_expression(model, "(contains glass water)"))
+    reference, stepper, asked = jax.jit(rules.step), IncrementalRules(rules, 1), []
+    flow = stepper._programs.flow
+    monkeypatch.setattr(stepper._programs, "flow", lambda *args: asked.append(args[2]) or flow(*args))
+    elsewhere = [(-2 + 0.01 * k, -2, 0.04) for k in range(24)]
+    under = [(0.12, 0, 0.3)] * 2  # in the stream
+    views = [jax.tree.map(np.asarray, home.view({"block": pos}, **POURS)) for pos in (*elsewhere, *under, *elsewhere)]
+    ours = theirs = volume.set_volume(model, initial_states(model, 1), home.index["jug"], "water", 1.8)
+    calls = []
+    for k, view in enumerate(views):
+        done, expected = stepper.step(ours, view), reference(theirs, view)
+        for a, b in zip(jax.tree.leaves(done.states), jax.tree.leaves(expected.states), strict=True):
+            np.testing.assert_array_equal(a, b, f"step {k}")
+        ours, theirs = done.states, expected.states
+        calls.append(len(asked))
+    assert calls[len(elsewhere) - 1] <= 6 < len(elsewhere) / 3, "one call computes several steps"
+    assert calls[len(elsewhere)] == calls[len(elsewhere) - 1] + 1, "the block is in the way: what was ahead is void"
+    assert np.asarray(coat.covered(model, ours))[0, home.index["block"]].any()

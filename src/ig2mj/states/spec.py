@@ -162,6 +162,8 @@ class StateSpec:
       part: of the step in which `update` runs. "events": after switches, cuts, water and dirt, with an `EventStep`, in
         which temperatures are those of the step before. "heat": after the temperatures, with a `HeatStep`.
       queries: relations between objects that `update` reads (`EventStep.relations`), as of `RelationPlan.build`.
+      follows: of a state of the part "heat": whether, in a scene, its fields follow from ig2mj's own temperatures of
+        the same step alone, and `update` changes no others; None: never.
       of_substances: only scenes that name substances have it. extra: only scenes that ask for this have it
         (`ig2mj.scene.extras`).
 
@@ -183,6 +185,7 @@ class StateSpec:
     set: Set | None = None
     part: str = "events"
     queries: Queries | None = None
+    follows: Callable[[StateModel], bool] | None = None
     of_substances: bool = False
     extra: str = ""
 

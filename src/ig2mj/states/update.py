@@ -9,6 +9,7 @@ States of plug-ins (`StateModel.added`) come after ig2mj's own in the part that 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
@@ -141,17 +142,33 @@ def sources(model: StateModel, states: ExtendedStates, view: PhysicsView, relati
 
 
 @entry_point
-def heat(model: StateModel, states: ExtendedStates, acts: Bool[Array, "W O S"], view: PhysicsView) -> ExtendedStates:
+def heat(
+    model: StateModel,
+    states: ExtendedStates,
+    acts: Bool[Array, "W O S"],
+    view: PhysicsView,
+    specs: Sequence[StateSpec] | None = None,
+) -> ExtendedStates:
     """The second part of a step: temperatures and what follows from them.
 
     Args:
-      acts: from `events`. view: of ig2mj's own states, only heat that passes by contact reads it.
+      acts: from `events`. view: of ig2mj's own states, only heat that passes by contact reads it. specs: only these, of
+        `heat_parts`.
     """
     step = HeatStep(model, states, acts, view, sliced.in_use(model, states.sliced))
-    for spec in (*HEAT, *_added(model, "heat")):
+    for spec in (*HEAT, *_added(model, "heat")) if specs is None else specs:
         assert spec.update is not None
         step = spec.update(step)
     return step.states
+
+
+def heat_parts(model: StateModel) -> tuple[tuple[StateSpec, ...], tuple[StateSpec, ...]]:
+    """The states of `heat` that depend on what they were, and those that follow from these alone
+    (`StateSpec.follows`)."""
+    added = _added(model, "heat")
+    if all(spec.follows is not None and spec.follows(model) for spec in added):
+        return HEAT, added
+    return (*HEAT, *added), ()  # others may read those that follow
 
 
 def _as_wholes(model: StateModel, cut_now: Bool[Array, "W O"], acts: Bool[Array, "W O S"]) -> Bool[Array, "W O S"]:

@@ -15,8 +15,8 @@ engines, with the states and the view of each control step. Six facts decide wha
   would change anything, `states.update.sources` which heat sources act. Each is called only where a field that it reads
   has changed. While sources act on the same objects, temperatures go on as before.
 - Where the last step changed nothing but temperatures, contents of containers and coats, and ig2mj's own states are
-  idle, one small program (`states.substances.flow_step`) takes the place of the first part. While nothing moves, it
-  computes several steps at a time.
+  idle, one small program (`states.substances.flow_step`) takes the place of the first part. While nothing moves that
+  these depend on, it computes several steps at a time.
 - A goal is evaluated where something that it reads has changed (`ig2mj.worlds.incremental_goal`).
 - The native engine marks views between which nothing but agents moved (`engine.view.but_agents`). Such a view counts as
   the same, unless the states or the goal read what differs. Fingers count as the same while all are out of reach of all
@@ -26,19 +26,19 @@ Updates of added states are traced (`ig2mj.states.added_checks`). Where one read
 changes other states in the second, every step is a whole one. Where one of the first part reads another added state of
 the second, a whole step follows each change of that.
 
-Axes: W worlds, O objects, S heat sources.
+Axes: W worlds, O objects, S heat sources, K streams.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Shaped
+from jaxtyping import Bool, Float, Shaped
 
 from ig2mj.engine.base import Engine
 from ig2mj.engine.native.execution import HostFunction
@@ -48,8 +48,9 @@ from ig2mj.states.definitions import heat_source, toggled_on
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
+from ig2mj.states.spec import StateSpec
 from ig2mj.states.substances import flow_step
-from ig2mj.states.update import can_be_idle, events, heat, heat_fields, idle, own_idle, queries, sources
+from ig2mj.states.update import can_be_idle, events, heat, heat_fields, heat_parts, idle, own_idle, queries, sources
 from ig2mj.states.world import ExtendedStates, Swap, with_fields
 from ig2mj.worlds.incremental_goal import AHEAD, GoalPrograms, IncrementalGoal, TemperatureSteps
 from ig2mj.worlds.rules import Outcome, Rules
@@ -103,13 +104,13 @@ class IncrementalRules:
         last = self._last
         if not self._enabled or last is None or self._acts is None or states is not last.states:
             return self._whole_step(states, jax.tree.leaves(states), view)
-        self._stands = True
+        self._stands, before = True, self._view
         if view is not self._view and not self._is_same(view) and not self._is_idle(view):
             return self._whole_step(states, self._leaves, view)
         flowed: frozenset[str] = frozenset()
         new: dict[str, Array] = {}
         if self._flows:
-            made = self._flow_step(view)
+            made = self._flow_step(before, view)
             if made is None:
                 return self._whole_step(states, self._leaves, view)
             if self._flows:
@@ -132,13 +133,13 @@ class IncrementalRules:
                 self._ahead, self._ahead_over = self._programs.heat(self._leaves, self._acts, view), 0
             ahead, k = self._ahead, self._ahead_over
             self._ahead_over += 1
-            same = ahead.same[k]
-            self._settled = all(same)
+            which = ahead.changed[k]
+            self._settled = not which
             changed = list[str]()
-            for name, place, steps, is_same in zip(*self._programs.of_heat, ahead.made, same, strict=True):
-                if not is_same:
-                    changed.append(name)
-                    self._leaves[place] = new[name] = steps[:, k]
+            for i in which:
+                name = self._programs.heat_names[i]
+                changed.append(name)
+                self._leaves[self._programs.heat_places[i]] = new[name] = ahead.made[i][:, k]
             states = self._programs.changed(states, new, self._leaves)
             if not self._programs.late_reads.isdisjoint(changed):
                 self._acts = None  # the next step is a whole one
@@ -149,13 +150,16 @@ class IncrementalRules:
         self._last = Outcome(states, None, status)
         return self._last
 
-    def _flow_step(self, view: PhysicsView) -> list[Array] | None:
+    def _flow_step(self, before: PhysicsView | None, view: PhysicsView) -> list[Array] | None:
         """The leaves that contents and coats are after this step, and notes whether it changes any; None: it is a whole
-        one."""
-        if not self._stands or self._flow_ahead is None or self._flow_over >= self._flow_ahead.steps:
-            steps = flow_step.AHEAD if self._stands else 1
-            self._flow_ahead, self._flow_over = self._programs.flow(self._leaves, view, steps), 0
-        k, ahead = self._flow_over, self._flow_ahead
+        one. `before`: the view of the last step."""
+        ahead, stands = self._flow_ahead, self._stands
+        if not stands and ahead is not None and before is not None:
+            stands = not flow_step.depend_on_moves(self._programs.model, before, view, ahead.starts)
+        if not stands or ahead is None or self._flow_over >= ahead.steps:
+            ahead = self._programs.flow(self._leaves, view, flow_step.AHEAD if stands else 1)
+            self._flow_ahead, self._flow_over = ahead, 0
+        k = self._flow_over
         if k >= ahead.complete:
             return None
         self._flow_over, self._flows = k + 1, bool(ahead.changes[k])
@@ -222,13 +226,15 @@ class FlowSteps(NamedTuple):
 
     Attributes:
       made: leaves of the states that these are, after each step. steps: how many were asked for. complete: how many are
-        those of a whole step. changes: whether each changes something.
+        those of a whole step. changes: whether each changes something. starts: where streams begin, m; NaN: there is
+        none.
     """
 
     made: list[Shaped[Array, "N W ..."]]
     steps: int
     complete: int
     changes: list[int]
+    starts: Float[np.ndarray, "W K 3"]
 
 
 class _Step(NamedTuple):
@@ -253,7 +259,7 @@ class _StatePrograms:
 
     Attributes:
       structure: of the states, as a pytree. heat_places, heat_names: of the leaves that the second part changes, their
-        places among the states' and the names of their fields. of_heat: both. flow_places: places of
+        places among the states' and the names of their fields. flow_places: places of
         `flow_step.FIELDS`. fingers_matter: also where they are out of reach of buttons. tells_idle: `idle` is of use.
         late_reads: fields that the second part changes and the first reads.
     """
@@ -266,7 +272,6 @@ class _StatePrograms:
             place for place, name in enumerate(names) if name in heat_fields(model) and named[place][1].size
         ]
         self.heat_names = [names[place] for place in self.heat_places]
-        self.of_heat = self.heat_names, self.heat_places
         self._are_arrays = all(len(named[place][0]) == 1 for place in self.heat_places)
         self.fingers_matter = FINGERS in AddedUpdates.of(model).reads
         added = AddedUpdates.of(model)
@@ -320,9 +325,9 @@ class _StatePrograms:
 
     def flow(self, leaves: list[Array], view: PhysicsView, steps: int) -> FlowSteps:
         """The next steps of contents and coats."""
-        made, flags = self._flow.flat([view, *leaves, np.int32(steps)], self._with_count)
+        made, flags, starts = self._flow.flat([view, *leaves, np.int32(steps)], self._with_count)
         count, *changes = flags.tolist()
-        return FlowSteps(made, steps, count, changes)
+        return FlowSteps(made, steps, count, changes, np.asarray(starts))
 
     def changed(self, states: ExtendedStates, fields: dict[str, Array], leaves: list[Array]) -> ExtendedStates:
         """The states with new values of some fields. `leaves`: all of them."""
@@ -342,7 +347,7 @@ class _StatePrograms:
     def heat(self, leaves: list[Array], acts: Array, view: PhysicsView) -> TemperatureSteps:
         """The second part of `update` in each of the next steps."""
         made, same = self._heat.flat([view, *leaves, acts], self._with_acts)
-        return TemperatureSteps(made, same.tolist())
+        return TemperatureSteps(made, [_not_in(tuple(row)) for row in same.tolist()])
 
     def _rules_fn(self, view: PhysicsView, before: list[Array]) -> tuple[Any, ...]:
         states = jax.tree.unflatten(self.structure, before)
@@ -361,27 +366,45 @@ class _StatePrograms:
     def _own_idle_fn(self, view: PhysicsView, leaves: list[Array]) -> Array:
         return own_idle(self.model, jax.tree.unflatten(self.structure, leaves), view, self._plan.evaluate(view))
 
-    def _flow_fn(self, view: PhysicsView, leaves: list[Array], steps: Array) -> tuple[list[Array], Array]:
+    def _flow_fn(self, view: PhysicsView, leaves: list[Array], steps: Array) -> tuple[list[Array], Array, Array]:
         states = jax.tree.unflatten(self.structure, leaves)
         done = flow_step.flowed(self.model, states, view, self._plan.evaluate(view), jnp.asarray(steps))
-        return list(done.made), jnp.concatenate([done.count[None], done.changes.astype(jnp.int32)])
+        flags = jnp.concatenate([done.count[None], done.changes.astype(jnp.int32)])
+        return list(done.made), flags, done.starts
 
     def _acts_fn(self, view: PhysicsView, leaves: list[Array]) -> Array:
         return sources(self.model, jax.tree.unflatten(self.structure, leaves), view, self._plan.evaluate(view))
 
     def _heat_fn(self, view: PhysicsView, leaves: list[Array], acts: Array) -> tuple[list[Any], Array]:
-        def step(before: list[Array], _: None) -> tuple[list[Array], tuple[list[Array], Array]]:
-            every = list(leaves)
-            for place, leaf in zip(self.heat_places, before, strict=True):
-                every[place] = leaf
-            new = jax.tree.leaves(heat(self.model, jax.tree.unflatten(self.structure, every), acts, view))
-            after = [new[place] for place in self.heat_places]
-            same = jnp.stack([jnp.all(a == b) for a, b in zip(before, after, strict=True)])
-            return after, (after, same)
+        changing, follow = heat_parts(self.model)
+        late = {name for spec in follow for name in spec.fields}
+        is_late = [name in late for name in self.heat_names]
+        first = [place for place, last in zip(self.heat_places, is_late, strict=True) if not last]
+        then = [place for place, last in zip(self.heat_places, is_late, strict=True) if last]
 
-        start: list[Array] = [jnp.asarray(leaves[place]) for place in self.heat_places]
-        made, same = jax.lax.scan(step, start, None, AHEAD)[1]
-        return [jnp.moveaxis(steps, 0, 1) for steps in made], same
+        def updated(values: list[Array], places: list[int], specs: Sequence[StateSpec], of: list[int]) -> list[Array]:
+            every = list(leaves)
+            for place, leaf in zip(places, values, strict=True):
+                every[place] = leaf
+            new = jax.tree.leaves(heat(self.model, jax.tree.unflatten(self.structure, every), acts, view, specs))
+            return [new[place] for place in of]
+
+        def step(before: list[Array], _: None) -> tuple[list[Array], list[Array]]:
+            after = updated(before, first, changing, first)
+            return after, after
+
+        def changes(made: Array, place: int) -> Bool[Array, "N"]:
+            before = jnp.concatenate([jnp.asarray(leaves[place])[None], made[:-1]])
+            return jnp.any(made != before, axis=tuple(range(1, made.ndim)))
+
+        start: list[Array] = [jnp.asarray(leaves[place]) for place in first]
+        made = jax.lax.scan(step, start, None, AHEAD)[1]
+        if then:  # of all steps at once
+            made = [*made, *jax.vmap(lambda values: updated(values, first, follow, then))(made)]
+        of_place = dict(zip((*first, *then), made, strict=True))
+        found = [of_place[place] for place in self.heat_places]
+        same = ~jnp.stack([changes(steps, place) for steps, place in zip(found, self.heat_places, strict=True)], axis=1)
+        return [jnp.moveaxis(steps, 0, 1) for steps in found], same
 
 
 def _are_same(one: ExtendedStates, other: ExtendedStates, but: Iterable[str] = ()) -> Bool[Array, ""]:
@@ -390,6 +413,12 @@ def _are_same(one: ExtendedStates, other: ExtendedStates, but: Iterable[str] = (
     leaves = zip(jax.tree_util.tree_leaves_with_path(one), jax.tree.leaves(other), strict=True)
     compared = [(a, b) for (path, a), b in leaves if a is not b and path[0].name not in but]
     return jnp.all(jnp.array([True, *(jnp.all(a == b) for a, b in compared)]))
+
+
+@functools.lru_cache(maxsize=256)
+def _not_in(flags: tuple[bool, ...]) -> tuple[int, ...]:
+    """Places of flags that are not set."""
+    return tuple(i for i, flag in enumerate(flags) if not flag)
 
 
 def _is_of_agents(field: str) -> bool:

@@ -43,12 +43,11 @@ class TemperatureSteps(NamedTuple):
     """Steps of temperatures, as long as nothing else changes.
 
     Attributes:
-      made: leaves of the states that temperatures are, after each step. same: of each step, whether it left each of
-        them as it was.
+      made: leaves of the states that temperatures are, after each step. changed: which of them each step changes.
     """
 
     made: list[Shaped[Array, "W N ..."]]
-    same: list[list[bool]]
+    changed: list[tuple[int, ...]]
 
 
 class IncrementalGoal:

@@ -1,7 +1,7 @@
 """Steps in which nothing but contents and coats change: the part of a control step that is left where all other events
 are known to be idle. `ig2mj.worlds.incremental` takes them on the native engine.
 
-Axes: W worlds, O objects, N = `AHEAD` steps.
+Axes: W worlds, O objects, K streams, N = `AHEAD` steps.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Bool, Int, Shaped
+import numpy as np
+from jaxtyping import Bool, Float, Int, Shaped
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.relations import Relations
 from ig2mj.states.spec import EventStep
-from ig2mj.states.substances import applying, coat, drying, reactions, volume, washing
+from ig2mj.states.substances import applying, coat, drying, flow_reads, reactions, volume, washing
 from ig2mj.states.world import ExtendedStates
 
 FIELDS = ("volume", "lost", "drawn", "coat", "absorbed")
@@ -33,12 +34,20 @@ class Flowed(NamedTuple):
 
     Attributes:
       made: `FIELDS` after each step. count: steps that are those of a whole step. changes: whether each changes
-        something.
+        something. starts: where streams begin, m, world frame; NaN: there is none.
     """
 
     made: Sequence[Shaped[Array, "N W ..."]]
     count: Int[Array, ""]
     changes: Bool[Array, "N"]
+    starts: Float[Array, "W K 3"]
+
+
+def depend_on_moves(
+    model: StateModel, before: PhysicsView, view: PhysicsView, starts: Float[np.ndarray, "W K 3"]
+) -> bool:
+    """Whether what has moved between two views can change these steps. `starts`: of `Flowed`."""
+    return bool(_others(model)) or flow_reads.depend_on_moves(model, before, view, starts)
 
 
 def possible(model: StateModel) -> bool:
@@ -98,7 +107,8 @@ def flowed(
     fields = _fields(states)
     room = [jnp.zeros((AHEAD, *f.shape), f.dtype) for f in (*fields, jnp.array(False))]
     count, _, _, made = jax.lax.while_loop(more, one, (jnp.int32(0), jnp.array(True), fields, room))
-    return Flowed(made[:-1], count, made[-1])
+    starts = jnp.where(jnp.any(first.chosen, axis=-1)[..., None], jnp.stack(ends.start, axis=-1), jnp.nan)
+    return Flowed(made[:-1], count, made[-1], starts)
 
 
 def _fields(states: ExtendedStates) -> list[jax.Array]:

@@ -90,4 +90,5 @@ SPEC = StateSpec(
     inherit=nothing_inherited,
     from_manifest=nothing_saved,  # follows from the temperature
     part="heat",
+    follows=lambda model: not (len(of(model).things.object) and len(of(model).containers.object)),
 )

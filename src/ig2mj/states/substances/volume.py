@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.frames import numbers
+from ig2mj.geometry.frames import Numbers, numbers
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep, Saved, StateSpec, nothing_inherited
 from ig2mj.states.substances import coat
@@ -136,8 +136,10 @@ class Outlets(NamedTuple):
 
 
 class Streams(NamedTuple):
-    """Where the streams of chosen outlets end, and which points of the objects that they meet they cover."""
+    """Where the streams of chosen outlets begin (m, world frame), where they end, and which points of the objects that
+    they meet they cover."""
 
+    start: Numbers
     landed: Landed
     points: UInt32[Array, "W K"]
 
@@ -206,13 +208,13 @@ def streams(step: EventStep, chosen: Bool[Array, "W K E"]) -> Streams:
         aside = [_of_chosen(of_containers, n) for n in openings.outwards()]
         falling = Falling(jnp.any(chosen, axis=-1), start, aside, of_containers, _origins(model, chosen))
         landed = land(model.tables, containers, falling, view)
-        return Streams(landed, coat.points_near(model, landed, view))
+        return Streams(start, landed, coat.points_near(model, landed, view))
 
     def none() -> Streams:
         container = jnp.zeros((worlds, most, len(containers.body)), bool)
         nothing = jnp.full((worlds, most), -1, jnp.int32)
         nowhere = [jnp.zeros((worlds, most))] * 3
-        return Streams(Landed(container, nothing, nowhere), jnp.zeros((worlds, most), jnp.uint32))
+        return Streams(nowhere, Landed(container, nothing, nowhere), jnp.zeros((worlds, most), jnp.uint32))
 
     return jax.lax.cond(jnp.any(chosen), follow, none)
 
