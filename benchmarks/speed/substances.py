@@ -105,7 +105,7 @@ def _with_moved(scene: Scene, view: PhysicsView) -> PhysicsView:
     loose = [o for o, e in enumerate(entries) if not e.fixed and e.inside is None and "cleaningTool" not in e.abilities]
     own = np.zeros(len(entries), bool)
     own[loose[0]] = True
-    shift = np.float32([0.0, 0.0, 0.001])
+    shift = np.array([0.0, 0.0, 0.001], np.float32)
     of_objects = ("object_pos", "object_com", "aabb_low", "aabb_high")
     fields = {name: np.asarray(getattr(view, name)) + own[:, None] * shift for name in of_objects}
     fields["body_pos"] = np.asarray(view.body_pos) + (scene.tables.body_object == loose[0])[:, None] * shift
