@@ -44,8 +44,7 @@ def clutter_in_the_way(world: PlannedWorld, step: Step) -> str | None:
     if point is None or nearest_floor(world, world.floor(), point, reach) is not None:
         return None
     loose = [n for n in world.domain.loose if n not in step.arguments and n not in world.held]
-    held = [world.index(n) for n in world.held if n and not world.domain.fixed(n)]
-    freed = world.planner.floor(world.view, without=[*held, *map(world.index, loose)], world=world.world)
+    freed = world.floor(without=[world.index(n) for n in loose])
     goal, (here, _) = nearest_floor(world, freed, point, reach), world.base
     way = None if goal is None else freed.way(here, goal)
     if way is None:

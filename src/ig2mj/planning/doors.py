@@ -91,13 +91,12 @@ def door_in_the_way(world: PlannedWorld, step: Step) -> str | None:
     floor, reach = world.floor(), world.body.reach if isinstance(world.body, HandedBody) else NEAR
     if nearest_floor(world, floor, point, reach) is not None:
         return None
-    held = [world.index(n) for n in world.held if n and not world.domain.fixed(n)]
-    freed = world.planner.floor(world.view, without=[*held, *doors], world=world.world)
+    freed = world.floor(without=doors)
     goal = nearest_floor(world, freed, point, reach)
     way = None if goal is None else freed.way(here, goal)
     if way is None:  # what lies behind the door may be pushed by it
         loose = [world.index(n) for n in world.domain.loose]
-        freed = world.planner.floor(world.view, without=[*held, *doors, *loose], world=world.world)
+        freed = world.floor(without=[*doors, *loose])
         goal = nearest_floor(world, freed, point, reach)
         way = None if goal is None else freed.way(here, goal)
     if way is None:

@@ -227,12 +227,15 @@ class PlannedWorld:
         frame = frame if rotation is None else rotation @ frame
         return self.body.axes(hand, frame)
 
-    def floor(self, holding: bool = False, reaching: bool = False, ahead: bool = False) -> FreeFloor:
+    def floor(
+        self, holding: bool = False, reaching: bool = False, ahead: bool = False, without: Collection[int] = ()
+    ) -> FreeFloor:
         """Where the robot can stand, without regard to what it holds.
 
         Args:
           holding: in any direction with what it holds. reaching: empty hands are where they rest, not tucked.
           ahead: with `holding`: only how far that reaches to the sides counts, as on a straight way ahead.
+          without: objects that do not count.
         """
         view, number, hands = self.view, self.world, self.body.hands
         held = [n if n and not self.domain.fixed(n) else "" for n in self.held]
@@ -260,7 +263,8 @@ class PlannedWorld:
                 footprint = footprint.holding(float(corners[:, 2].min()), float(corners[:, 2].max()), away)
         if not self.body.sideways and not self.crosses:
             footprint = footprint.on_wheels()
-        return self.planner.floor(view, footprint, without=[self.index(n) for n in held if n], world=number)
+        without = [*without, *(self.index(n) for n in held if n)]
+        return self.planner.floor(view, footprint, without, number)
 
     def away(self, spheres: Float[np.ndarray, "S 4"]) -> float:
         """m, horizontal, that a base would like to be from where a hand puts what it holds, whose spheres these are."""
