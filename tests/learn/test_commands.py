@@ -7,6 +7,8 @@ import json
 import pytest
 
 from ig2mj.cli import call
+from ig2mj.cli.train import _devices
+from ig2mj.errors import Ig2mjError
 
 POOL = ["--pool-size", "4"]
 
@@ -95,7 +97,6 @@ def test_processes_join_before_jax_looks_for_devices(monkeypatch, capsys):
     import jax
 
     from ig2mj.cluster.team import Team
-    from ig2mj.errors import Ig2mjError
 
     asked = []
 
@@ -124,3 +125,10 @@ def test_a_training_leaves_reports_checkpoints_a_policy_and_films(tmp_path, caps
     assert [f.name for f in (run / "checkpoints").iterdir()]
     assert call(["train", "GraspingBook", "--minutes", "0.2", *settings]) == 2
     assert "holds a run already: --resume continues it" in capsys.readouterr().err
+
+
+def test_all_devices_are_none_to_share_where_there_is_one():
+    """A single device is trained on as without `--devices`, also by the native engine."""
+    assert _devices("all", 1) == _devices("1", 1) == []
+    with pytest.raises(Ig2mjError, match="--devices 2: this run can have 1"):
+        _devices("2", 1)

@@ -310,9 +310,9 @@ def _devices(requested: str, processes: int) -> list[Any]:
 
     from ig2mj.errors import Ig2mjError
 
-    if requested == "1" and processes == 1:
+    every = jax.devices() if requested != "1" or processes > 1 else []
+    if processes == 1 and (requested == "1" or (requested == "all" and len(every) == 1)):
         return []
-    every = jax.devices()
     least = min(sum(d.process_index == p for d in every) for p in range(processes))
     each = least if requested == "all" else int(requested) // processes
     if not 0 < each <= least or (requested != "all" and int(requested) % processes):
