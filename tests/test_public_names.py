@@ -80,3 +80,12 @@ def test_help_of_a_public_name_says_what_it_is():
                 told[f"{package.__name__}.{name}"] = (getattr(thing, "__doc__", "") or "").strip()
     assert len(told) > 100
     assert [name for name, text in told.items() if not text or text.startswith("See the module")] == []
+
+
+def test_an_unknown_name_lists_what_there_is_or_examples_of_it():
+    from ig2mj.errors import UnknownNameError
+
+    few, many = [f"name_{k}" for k in range(3)], [f"name_{k}" for k in range(50)]
+    assert str(UnknownNameError("thing", "xyz", few)).endswith("(there is name_0, name_1, name_2)")
+    assert str(UnknownNameError("thing", "xyz", many)).endswith("name_4, name_5 and 44 more)")
+    assert str(UnknownNameError("thing", "xyz", ())).endswith("(there is none)")

@@ -64,6 +64,9 @@ class UnknownNameError(Ig2mjError):
     FEW = 20
     """So many names are listed where none is near."""
 
+    EXAMPLES = 6
+    """So many are listed where there are more."""
+
     def __init__(self, kind: str, name: str, known: Iterable[str], *, meant: str | None = None, also: str = ""):
         """`meant`: the one of `known` that is named instead of near matches. `also`: what ends the message."""
         name = str(name)  # whatever else was given in a name's place
@@ -74,8 +77,10 @@ class UnknownNameError(Ig2mjError):
             hint = f"; near matches: {', '.join(near)}"
         elif names and len(names) <= self.FEW:
             hint = f" (there is {', '.join(names)})"
+        elif names:
+            hint = f" (there is {', '.join(names[: self.EXAMPLES])} and {len(names) - self.EXAMPLES} more)"
         else:
-            hint = "" if names else " (there is none)"
+            hint = " (there is none)"
         super().__init__(f"no {kind} is named '{name}'{hint}{also and '; '}{also}")
 
 

@@ -269,7 +269,7 @@ def _check(chosen: RunOptions, settings: RunSettings, out: pathlib.Path | None) 
     if obs not in MODES:
         raise UnknownNameError("kind of observation", obs, MODES)
     if not 0 < chosen.minutes < float("inf") or not 0 <= chosen.videos < float("inf"):
-        words = "finite, more than 0, and 0 or more"
+        words = "the first must be above 0, the second 0 or more, both finite"
         raise Ig2mjError(f"--minutes {chosen.minutes}, --videos {chosen.videos}: {words}")
     if stop is not None and not 0 < stop <= 1:
         raise Ig2mjError(f"--stop-at-success {stop}: a share is more than 0 and at most 1")

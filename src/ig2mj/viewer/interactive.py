@@ -35,7 +35,10 @@ _SPACE, _SLASH, _PUSH, _ENTER, _BACKSPACE, _RIGHT = 32, 47, ord("P"), 257, 259, 
 PREPARING = ("preparing", "states are compiled; once per machine and scene")
 """What the window says before the first step."""
 
-_NO_DISPLAY = "a window needs a display: set DISPLAY, or write an image with `ig2mj view SCENE --image out.png`"
+_NO_DISPLAY = (
+    "a window needs a display: set DISPLAY, use the browser (`ig2mj web NAME`), or write an image with"
+    " `ig2mj view SCENE --image out.png`"
+)
 
 
 @runtime_checkable
