@@ -170,16 +170,9 @@ def turn_at(world: PlannedWorld, hand: int, point: Vector, quat, keeps: int = -1
     return [dataclasses.replace(there, quat=None), there]
 
 
-def carry(world: PlannedWorld, hand: int, keeps: int = -1, name: str = "", at: Vector | None = None) -> Phase:
-    """A hand goes to where it carries what it holds, or is about to hold: `name`, by a point of it, `at`."""
+def carry(world: PlannedWorld, hand: int, keeps: int = -1, name: str = "") -> Phase:
     return Phase(
-        hand=hand,
-        pos=vector3(world.carry(hand, name, at)),
-        in_body=True,
-        keeps=keeps,
-        tolerance=0.08,
-        limit=40,
-        after="",
+        hand=hand, pos=vector3(world.carry(hand, name)), in_body=True, keeps=keeps, tolerance=0.08, limit=40, after=""
     )
 
 

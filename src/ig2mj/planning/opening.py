@@ -124,8 +124,8 @@ Tried = collections.Counter[str]
 
 
 def open_around(world: PlannedWorld, name: str, tried: Tried) -> Generator[Program, str, bool]:
-    """Opens the drawer that an object is in, else doors in front of it, the nearest first; where all are open, shuts
-    drawers that it is not in, above one that it is in. Returns whether there was one that has not been tried `TRIES`
+    """Opens the drawer that an object is in, else doors in front of it, the nearest first; shuts drawers above one that
+    it is in, first for hands that float, and where all are open, drawers that it is not in. Returns whether there was one that has not been tried `TRIES`
     times."""
     near, facts = world.com(name), world.facts
     containers = [c for c in facts.containers(name) if world.domain.opens(c)]
@@ -140,7 +140,8 @@ def open_around(world: PlannedWorld, name: str, tried: Tried) -> Generator[Progr
     opened = around or [j for j in found if j.hinge] or found
     others = [j for j in found if not j.hinge and j not in around]
     above = [j for j in others if float(j.vertices[:, 2].min()) > float(near[2])]
-    return (yield from _move_one(world, opened, above if around else others, tried))
+    first = bool(around) and world.body.opening is None
+    return (yield from _move_one(world, opened, above if around else others, tried, closes_first=first))
 
 
 def open_into(world: PlannedWorld, where: str, tried: Tried) -> Generator[Program, str, bool]:
@@ -150,16 +151,22 @@ def open_into(world: PlannedWorld, where: str, tried: Tried) -> Generator[Progra
 
 
 def _move_one(
-    world: PlannedWorld, opened: list[OpenableJoint], closed: list[OpenableJoint], tried: Tried
+    world: PlannedWorld,
+    opened: list[OpenableJoint],
+    closed: list[OpenableJoint],
+    tried: Tried,
+    closes_first: bool = False,
 ) -> Generator[Program, str, bool]:
-    """Opens the first that is not wide open, else shuts the first that is open."""
+    """Opens the first that is not wide open, else shuts the first that is open; `closes_first`: the other way about, as
+    below an open drawer hands have little room."""
     if all(world.held):
         return False
     shut = [j for j in opened if j.fraction < (WIDE if j.hinge else FAR_OUT) and tried[j.name] < TRIES]
     out = [j for j in closed if j.fraction > AJAR and tried[f"{j.name} shut"] < TRIES]
     if not shut and not out:
         return False
-    joint, opens = (shut[0], True) if shut else (out[0], False)
+    opens = bool(shut) and not (closes_first and out)
+    joint = shut[0] if opens else out[0]
     key = joint.name if opens else f"{joint.name} shut"
     yield from move_joint(world, joint, free_hand(world, tried[key]), opens, tried[key])
     now = {j.name: j.fraction for j in joints_of(world, joint.object)}

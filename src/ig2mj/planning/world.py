@@ -270,22 +270,13 @@ class PlannedWorld:
         """m, horizontal, that a base would like to be from where a hand puts what it holds, whose spheres these are."""
         return float(min(AWAY + max(np.linalg.norm(spheres[:, :2], axis=1).max() - ALONG[-1], 0.0), FARTHEST))
 
-    def carry(self, hand: int, name: str = "", at: Vector | None = None) -> Vector:
-        """Where a hand carries an object, "": what it holds, in the body's frame: so far ahead that it is off the body.
-
-        Args:
-          at: where the hand's grasp point is on the object, m; None: where it is now.
-        """
+    def carry(self, hand: int, name: str = "") -> Vector:
+        """Where a hand carries an object, "": what it holds, in the body's frame: as far ahead as that is wide."""
         x, y, z = self.body.carry[hand]
         if name := name or self.held[hand]:
             low, high = self.vertices(name).min(0), self.vertices(name).max(0)
             half = float(np.linalg.norm((high - low)[:2])) / 2
-            back = half
-            if self.body.opening is None:  # what a floating hand holds keeps its orientation
-                _, yaw = self.base
-                point = self.grip(hand) if at is None else at
-                back = -float(((self.vertices(name) - point)[:, :2] @ (np.cos(yaw), np.sin(yaw))).min())
-            x = max(x, self.body.trunk[0] + BODY_SPARE + back)
+            x = max(x, self.body.trunk[0] + BODY_SPARE + half)
             y = 0.0 if half > WIDE and self.body.opening is None else y  # the middle of the way through a door
         return np.array([x, y, z])
 
