@@ -125,8 +125,8 @@ Tried = collections.Counter[str]
 
 def open_around(world: PlannedWorld, name: str, tried: Tried) -> Generator[Program, str, bool]:
     """Opens the drawer that an object is in, else doors in front of it, the nearest first; shuts drawers above one that
-    it is in, first for hands that float, and where all are open, drawers that it is not in. Returns whether there was one that has not been tried `TRIES`
-    times."""
+    it is in, first for hands that float, and where all are open, drawers that it is not in. Returns whether there was
+    one that has not been tried `TRIES` times."""
     near, facts = world.com(name), world.facts
     containers = [c for c in facts.containers(name) if world.domain.opens(c)]
     found = [j for c in containers for j in joints_of(world, c)]
