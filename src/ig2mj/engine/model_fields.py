@@ -41,7 +41,8 @@ class ModelFields:
       geom_rgba, mat_rgba: colours, 0..1; seen where MuJoCo draws (`Engine.to_mujoco`) and by cameras.
       geom_matid: material of each geom, -1 for none; likewise.
       body_pos, body_quat: poses of bodies in their parents' frames (m, w-x-y-z); of a body without joints that hangs on
-        the world, where it stands.
+        the world, where it stands. For robots: streams of substances meet objects that never move where the scene has
+        them.
       cam_pos, cam_quat: poses of cameras in their bodies' frames (m, w-x-y-z).
     """
 
