@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.agents.registry import find_robot
 from ig2mj.demos.environments import RecordedEnvironment, record
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.planning_stage import EnvironmentStage, problem_env
@@ -37,6 +38,9 @@ from ig2mj.sampling.query import SceneQuery
 
 SECONDS_PER_STEP, SECONDS_MORE = 120.0, 200.0
 """Simulated s of an episode's horizon: for each step of its plan, and more, as long as BEHAVIOR's activities last."""
+
+ON_WHEELS = 2
+"""By how much longer episodes of robots with wheels last: an arm moves its hand at half a floating hand's speed."""
 
 PLAN = "plan"
 """Attribute of a run: what was done, as JSON (`ig2mj.planning.results.row_of`), and the `number` of the episode."""
@@ -93,7 +97,8 @@ class Episodes:
         rows = max([0, *numbers]) + 1
         self.numbers = [n for n in numbers if problem.own_goal or n < self._size(split, rows)]
         worlds = max(1, min(worlds, len(self.numbers)))
-        options: dict[str, Any] = {"rows": rows, "split": split, "horizon": self._horizon(split, rows)}
+        horizon = self._horizon(split, rows) * (ON_WHEELS if find_robot(robot)[1].drives else 1)
+        options: dict[str, Any] = {"rows": rows, "split": split, "horizon": horizon}
         options["grasping"] = grasping
         self.env: Environment = problem_env(problem, robot, worlds, **options)
         self._step = self.env.step
