@@ -325,6 +325,8 @@ class StepBuilder:
         count = self._failed.get(c, 0)
         if c == self._begun or count < LATER or self._domain.hands < 2 or rule.predicate not in ("inside", "on_top"):
             return None
+        if not self._failures((PLACE[rule.predicate], *rule.arguments)):  # it was not room that was lacking
+            return None
         there = [
             w
             for w in self._required
