@@ -30,7 +30,7 @@ from ig2mj.sensors.shading import limit_light
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)
 """Geom types, as in `mujoco.mjtGeom`."""
 
-CONSTRUCTOR, LEAF = "sah", 2
+CONSTRUCTOR, LEAF = "cubql", 2
 """How trees of merged meshes are built; they are built once."""
 
 ELSEWHERE = (0.0, 0.0, 100.0)
