@@ -133,9 +133,21 @@ def _way(
     return None if way is None else (start, way)
 
 
-def _holds_at(world: PlannedWorld, name: str, hand: int, points: Sequence[Vector], link: int = -1) -> list[_Hold]:
-    """A held object's centre of mass and parts, or an annotated link of it, at some points."""
-    return [_Hold(point, o, tilt) for o, tilt in _offsets(world, name, hand, link) for point in points]
+def _holds_at(world: PlannedWorld, name: str, hand: int, points: Sequence[Vector]) -> list[_Hold]:
+    """A held object's centre of mass and parts at some points."""
+    return [_Hold(point, o, tilt) for o, tilt in _offsets(world, name, hand) for point in points]
+
+
+def _blades_at(world: PlannedWorld, knife: str, hand: int, point: Vector, link: int, first: int) -> list[_Hold]:
+    """The blade of a held knife at a point, as it is held and, by a hand that floats, turned about the vertical.
+
+    Args:
+      link: of the knife, its blade. first: number of the direction that comes first.
+    """
+    offset = world.grip(hand) - np.asarray(world.view.link_pos)[world.world, link].astype(float)
+    turns = BLADE_TURNS if world.body.opening is None else BLADE_TURNS[:1]
+    numbers = np.roll(np.arange(len(turns)), -first)
+    return [_Hold(point, about_vertical(turns[k]) @ offset, about_vertical(turns[k]), int(k)) for k in numbers]
 
 
 def _holds_below(world: PlannedWorld, name: str, hand: int, source: Vector) -> list[_Hold]:
@@ -164,12 +176,10 @@ def _spheres(world: PlannedWorld, name: str, hand: int, rotation: Rotation) -> n
     return world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
 
 
-def _offsets(world: PlannedWorld, name: str, hand: int, link: int) -> list[tuple[Vector, Rotation]]:
-    """From parts of a held object to the hand's grasp point, m, with the rotations by which the hand is turned: an
-    annotated link, else the middle and what is far ahead. What is long is also held so that it points ahead."""
+def _offsets(world: PlannedWorld, name: str, hand: int) -> list[tuple[Vector, Rotation]]:
+    """From parts of a held object, its middle and what is far ahead, to the hand's grasp point, m, with the rotations
+    by which the hand is turned. What is long is also held so that it points ahead."""
     grip, out = world.grip(hand), ahead(world.base[1])
-    if link >= 0:
-        return [(grip - np.asarray(world.view.link_pos)[world.world, link].astype(float), np.eye(3))]
     corners, centre = world.vertices(name) - grip, world.com(name) - grip
     tilts = [np.eye(3)]
     if np.linalg.norm(centre) > LONG:
@@ -279,8 +289,7 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
                 return Outcome("slipped", f"the hand lost {knife}", attempts=attempt)
             hand = hand_with(world, knife)
         top = np.array([*world.com(name)[:2], world.vertices(name)[:, 2].max()])
-        points = [top + CUT_ABOVE * UP]
-        holds = functools.partial(_holds_at, world, knife, hand, points, int(links[0]))
+        holds = functools.partial(_blades_at, world, knife, hand, top + CUT_ABOVE * UP, int(links[0]), attempt)
         reason, way, _ = yield from _hold_at(world, knife, hand, holds)
         if reason:
             continue
@@ -301,6 +310,9 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
         return Outcome(attempts=ATTEMPTS)
     return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
+
+BLADE_TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)
+"""rad by which a blade is turned about the vertical: what rolled away from it is cut from another side."""
 
 CUT_ABOVE, CUT_DEPTH = 0.08, 0.04
 """m above what is cut at which the blade comes to it, and below its top that it goes for."""
