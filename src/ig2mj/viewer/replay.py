@@ -124,6 +124,9 @@ def _with_model(scene: Scene, model: mujoco.MjModel, file: str | os.PathLike) ->
     more = {"body_object": model.nbody - bodies, "body_agent": model.nbody - bodies, "body_hand": model.nbody - bodies}
     more |= {"geom_object": model.ngeom - geoms, "actuator_agent": model.nu - len(scene.tables.actuator_agent)}
     padded = {n: np.pad(getattr(scene.tables, n), (0, count), constant_values=-1) for n, count in more.items()}
+    for name in ("body_rests", "body_rest_pos", "body_rest_quat"):  # of what belongs to objects
+        column = getattr(scene.tables, name)
+        padded[name] = np.concatenate([column, np.zeros((model.nbody - bodies, *column.shape[1:]), column.dtype)])
     tables = dataclasses.replace(scene.tables, **padded)
     looks = scene.looks if model.nbody == bodies else PLAIN  # files of the scene have no further agents
     return dataclasses.replace(scene, model=model, tables=tables, looks=looks)
