@@ -68,7 +68,7 @@ class ExtendedStates(_Fields):
 
 def with_fields(states: ExtendedStates, fields: Mapping[str, Any]) -> ExtendedStates:
     """A copy with other values of some fields, in less time than a constructor takes, which sets each by itself."""
-    new = object.__new__(type(states))
+    new: Any = object.__new__(type(states))
     vars(new).update(vars(states), **fields)
     return new
 
