@@ -119,6 +119,19 @@ def test_programs_of_worlds_of_different_lengths_are_packed_into_arrays():
     assert rows["moves"].tolist() == [1, 0] and rows["until"].tolist() == [Until.HELD, Until.THERE]
 
 
+def test_a_robot_goes_around_another_one(tiny_home_folder):
+    """It would push it along: robots are driven to where they are told."""
+    agents = [TurtleBot(name="one").at(-1.0, -1.4, 0.0), TurtleBot(name="other").at(0.0, -1.4, 0.0)]
+    scene = ig2mj.load_scene(tiny_home_folder, agents=agents)
+    view = SceneQuery(scene).view
+    floors = [MotionPlanner(scene, agent).floor(view) for agent in range(2)]
+    cells = [tuple(floors[0].occupancy.cells(np.asarray(view.agent.base_pos)[0, agent, :2])) for agent in range(2)]
+    assert [[bool(floor.free[cell]) for cell in cells] for floor in floors] == [[True, False], [False, True]]
+    plan = MotionPlanner(scene, 0).plan_base(view, (1.0, -1.4))
+    away = np.linalg.norm(np.diff(plan.points, axis=0), axis=1).sum()
+    assert not plan.reason and away > 2.05, "2 m straight on, through the other one"
+
+
 @pytest.mark.slow
 def test_a_wheeled_robot_follows_ways_in_two_worlds_at_once(with_robot):
     stage = CoreStage(with_robot, NativeEngine(with_robot, 2))

@@ -346,7 +346,9 @@ class _From:
             best = int(np.argmax(np.where(left, covers.sum(1) - HIDDEN * roofed, -np.inf)))
             own = covers[best] & ~taken
             spot = spots[near[best]]
-            strokes.append(_Stroke(spot, int(turns[near[best]]), [spots[k] for k in np.flatnonzero(own)], roofed[best]))
+            strokes.append(
+                _Stroke(spot, int(turns[near[best]]), [spots[k] for k in np.flatnonzero(own)], bool(roofed[best]))
+            )
             taken |= own
             left &= ~covers[best][near]
         strokes = _one_after_another(strokes)

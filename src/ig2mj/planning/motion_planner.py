@@ -119,14 +119,15 @@ class MotionPlanner:
         without: Collection[int] = (),
         world: int = 0,
     ) -> FreeFloor:
-        """Where the robot can stand.
+        """Where the robot can stand, next to the scene's other robots, too.
 
         Args:
           footprint: None: that of the robot as it stands. without: objects that do not count, such as what it holds.
         """
         footprint = footprint or BaseFootprint.of_robot(self.scene, view, self.agent, world)
         held = np.flatnonzero(np.asarray(view.held)[world].any(0)) if np.asarray(view.held).size else np.zeros(0, int)
-        free, spare = self.occupancy.free(view, footprint, {*without, *held.tolist()}, world)
+        others = [k for k in range(len(self.scene.agents)) if k != self.agent]
+        free, spare = self.occupancy.free(view, footprint, {*without, *held.tolist()}, world, others)
         for kept in self._floors:
             if np.array_equal(kept.spare, spare):
                 return kept

@@ -160,16 +160,44 @@ class Occupancy:
         return np.flatnonzero(grid)
 
     def free(
-        self, view: PhysicsView, footprint: BaseFootprint, without: Collection[int] = (), world: int = 0
+        self,
+        view: PhysicsView,
+        footprint: BaseFootprint,
+        without: Collection[int] = (),
+        world: int = 0,
+        others: Collection[int] = (),
     ) -> tuple[Bool[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
-        """Where a robot can stand, and how much farther than that it is from what is taken, m."""
+        """Where a robot can stand, and how much farther than that it is from what is taken, m.
+
+        Args:
+          without: objects that do not count. others: numbers of robots that stand in the way.
+        """
         spare = np.full(self.shape, np.inf)
         for disc in footprint.discs:
             taken = self.taken(view, disc.low, disc.high, without, world)
             spare = np.minimum(spare, self._distance_to(taken) - disc.radius - CLEARANCE)
+        for other in others:
+            spare = np.minimum(spare, self._spare_of(view, footprint, other, world))
         if footprint.wheels and self.covered.any():
             spare = np.minimum(spare, self._distance_to(self.covered) - footprint.wheels)
         return (spare >= 0) & self.floor, spare
+
+    def _spare_of(
+        self, view: PhysicsView, footprint: BaseFootprint, other: int, world: int
+    ) -> Float[np.ndarray, "h w"] | float:
+        """How much farther than it has to be from another robot a robot is, m."""
+        spare = [
+            disc.radius + its.radius
+            for disc in footprint.discs
+            for its in BaseFootprint.of_robot(self.scene, view, other, world).discs
+            if disc.low < its.high and its.low < disc.high
+        ]
+        if not spare:
+            return np.inf
+        rows, columns = np.indices(self.shape)
+        middles = self.middles(np.stack([rows, columns], axis=-1))
+        xy = np.asarray(view.agent.base_pos)[world, other, :2]
+        return np.linalg.norm(middles - xy, axis=-1) - max(spare) - CLEARANCE
 
     def _distance_to(self, taken: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
         """m from the middle of each cell to that of the nearest taken one; kept for the grids asked for last."""
