@@ -58,8 +58,8 @@ FALLS_OVER, FALLING = ("on_floor", "on_top", "inside"), 15
 """Placements that stay true where an object falls over, and agent steps that it falls."""
 
 UNDER = 0.85
-"""m, horizontal, that a base would like to be from what is put below something: it is let down before that, and goes
-straight in."""
+"""m, horizontal, that the base of hands that float would like to be from what is put below something: it is let down
+before that, and goes straight in."""
 
 STANCES, WAYS, ARM_WAYS = 3, 30, 200
 """Stances for each spot, and ways of a hand that are looked for, at most: of one that floats, and of one on an arm."""
@@ -272,7 +272,9 @@ def _plan(
         for spot, target, spheres in spots():
             lacking = _NO_STANCE if lacking == _NO_WAY and not seen else lacking
             palm = world.hand_axes(hand, grip_for(world, hand, name, spot)[2])[1]
-            away = max(world.away(spheres), UNDER if predicate == "under" else 0.0)
+            away = world.away(spheres)
+            if predicate == "under" and world.body.opening is None:
+                away = max(away, UNDER)
             for stance in stances(world, hand, target, floor, away, most=STANCES):
                 lacking = _NO_WAY
                 if points_ahead(world, palm, stance.yaw):

@@ -138,16 +138,18 @@ def _holds_at(world: PlannedWorld, name: str, hand: int, points: Sequence[Vector
     return [_Hold(point, o, tilt) for o, tilt in _offsets(world, name, hand) for point in points]
 
 
-def _blades_at(world: PlannedWorld, knife: str, hand: int, point: Vector, link: int, first: int) -> list[_Hold]:
-    """The blade of a held knife at a point, as it is held and, by a hand that floats, turned about the vertical.
+def _blades_at(
+    world: PlannedWorld, knife: str, hand: int, points: Sequence[Vector], link: int, first: int
+) -> list[_Hold]:
+    """The blade of a held knife at some points, as it is held and turned about the vertical.
 
     Args:
       link: of the knife, its blade. first: number of the direction that comes first.
     """
     offset = world.grip(hand) - np.asarray(world.view.link_pos)[world.world, link].astype(float)
-    turns = BLADE_TURNS if world.body.opening is None else BLADE_TURNS[:1]
-    numbers = np.roll(np.arange(len(turns)), -first)
-    return [_Hold(point, about_vertical(turns[k]) @ offset, about_vertical(turns[k]), int(k)) for k in numbers]
+    turns = [about_vertical(turn) for turn in BLADE_TURNS]
+    ways = [(point, turns[k]) for point in points for k in np.roll(np.arange(len(turns)), -first)]
+    return [_Hold(point, turn @ offset, turn, number) for number, (point, turn) in enumerate(ways)]
 
 
 def _holds_below(world: PlannedWorld, name: str, hand: int, source: Vector) -> list[_Hold]:
@@ -289,13 +291,15 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
                 return Outcome("slipped", f"the hand lost {knife}", attempts=attempt)
             hand = hand_with(world, knife)
         top = np.array([*world.com(name)[:2], world.vertices(name)[:, 2].max()])
-        holds = functools.partial(_blades_at, world, knife, hand, top + CUT_ABOVE * UP, int(links[0]), attempt)
+        points = [top + above * UP for above in CUT_ABOVE]
+        holds = functools.partial(_blades_at, world, knife, hand, points, int(links[0]), attempt)
         reason, way, _ = yield from _hold_at(world, knife, hand, holds)
         if reason:
             continue
         keeps, before = world.index(knife), world.grip(hand)
         down, tolerance, limit, speed = CUT if world.body.opening is None else ARM_CUT
-        for depth in np.arange(CUT_ABOVE - down, -CUT_DEPTH - down / 2, -down):  # no farther than the cut
+        above = float(np.asarray(world.view.link_pos)[world.world, links[0], 2] - top[2])
+        for depth in np.arange(above - down, -CUT_DEPTH - down / 2, -down):  # no farther than the cut
             blade = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
             pressed = vector3(top + depth * UP - blade + world.grip(hand))
             reason = yield [
@@ -314,8 +318,9 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
 BLADE_TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)
 """rad by which a blade is turned about the vertical: what rolled away from it is cut from another side."""
 
-CUT_ABOVE, CUT_DEPTH = 0.08, 0.04
-"""m above what is cut at which the blade comes to it, and below its top that it goes for."""
+CUT_ABOVE, CUT_DEPTH = (0.08, 0.14), 0.04
+"""m above what is cut at which the blade comes to it, higher where other things stand next to it, and below its top
+that the blade goes for."""
 
 CUT, ARM_CUT = (0.01, 0.005, 2, 0.01), (0.02, 0.01, 10, 0.04)
 """Steps in which a blade goes down, between looks at what is cut, of a hand that floats and of one on an arm: m of a
