@@ -25,6 +25,7 @@ import numpy as np
 import ig2mj
 from benchmarks.harness.results import keep_row, machine, provenance
 from ig2mj.envs.experts import expert_of
+from ig2mj.envs.rollout import play
 from ig2mj.errors import Ig2mjError
 from ig2mj.process import keep_scratch_in_place
 from ig2mj.process.processors import available
@@ -104,15 +105,7 @@ def _experts(job: dict[str, Any]) -> dict[str, Any]:
     home = None if job["home"] == ACTIVITIES[job["task"]].home else job["home"]
     options: dict[str, Any] = {"home": home, "split": "held_out", "pool_size": job["rows"]}
     env = ig2mj.make(job["task"], job["robot"], job["rows"], "native", observations="proprioception", **options)
-    expert, state = expert_of(env), env.start_from(np.arange(job["rows"]))
-    success, over = np.zeros(job["rows"], bool), np.zeros(job["rows"], bool)
-    for _ in range(env.task.horizon):
-        state = env.step(state, np.asarray(expert(state)))
-        success |= np.asarray(state.info["success"]) & ~over
-        over |= np.asarray(state.done)
-        if over.all():
-            break
-    return {"success": float(success.mean())}
+    return {"success": float(np.mean(play(env, expert_of(env), job["rows"], in_order=True).success))}
 
 
 def _throughput(job: dict[str, Any]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ig2mj.planning.cleaning import PRESSED, _about, _one_after_another, _Region, _Stroke
+from ig2mj.planning.cleaning_strokes import PRESSED, Region, Stroke, one_after_another, turn_about
 from ig2mj.planning.world import DirtSpot
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -19,7 +19,7 @@ def covered(region, pressed_on, spots):
 
 @pytest.mark.parametrize("angle", [0.0, 0.8])
 def test_a_tool_is_pressed_so_far_into_a_face_however_it_is_tilted(angle):
-    region, spot = _Region.turned(_about(np.array([1.0, 0.0, 0.0]), angle), SPONGE), DirtSpot(0, np.zeros(3), UP)
+    region, spot = Region.turned(turn_about(np.array([1.0, 0.0, 0.0]), angle), SPONGE), DirtSpot(0, np.zeros(3), UP)
     grip = region.at(spot)
     assert (grip + region.corners)[:, 2].min() == pytest.approx(-PRESSED)
     assert covered(region, spot, [spot]) == [spot]
@@ -28,7 +28,7 @@ def test_a_tool_is_pressed_so_far_into_a_face_however_it_is_tilted(angle):
 
 def test_a_tilted_tool_reaches_particles_above_the_face_that_it_is_pressed_on():
     face, above = DirtSpot(0, np.zeros(3), UP), DirtSpot(1, np.array([0.0, 0.03, 0.04]), -UP)
-    flat, tilted = (_Region.turned(_about(np.array([1.0, 0.0, 0.0]), a), SPONGE) for a in (0.0, 0.8))
+    flat, tilted = (Region.turned(turn_about(np.array([1.0, 0.0, 0.0]), a), SPONGE) for a in (0.0, 0.8))
     assert covered(flat, face, [face, above]) == [face]
     assert covered(tilted, face, [face, above]) == [face, above]
 
@@ -36,5 +36,5 @@ def test_a_tilted_tool_reaches_particles_above_the_face_that_it_is_pressed_on():
 def test_upper_sides_come_first_and_then_the_nearest():
     spots = [DirtSpot(n, np.array([x, 0.0, 0.8]), UP) for n, x in enumerate((0.0, 1.0, 0.1))]
     side = DirtSpot(3, np.array([0.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.0]))
-    strokes = [_Stroke(s, 0, [s]) for s in (side, *spots)]
-    assert [s.spot.number for s in _one_after_another(strokes)] == [0, 2, 1, 3]
+    strokes = [Stroke(s, 0, [s]) for s in (side, *spots)]
+    assert [s.spot.number for s in one_after_another(strokes)] == [0, 2, 1, 3]

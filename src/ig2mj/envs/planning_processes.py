@@ -103,7 +103,7 @@ class PlanningProcesses:
 
     def _send(self, number: int) -> None:
         """Sends a process its next request if it has answered all others: a pipe holds less than a request, and
-        writing to one that nobody reads blocks."""
+        writing to one whose reader is busy blocks."""
         if self._waiting[number] and not self._busy[number]:
             self._busy[number] = True
             self._pipes[number].send(self._waiting[number].popleft())

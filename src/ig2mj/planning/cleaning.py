@@ -1,21 +1,27 @@
 """Wiping dust and scrubbing stains: a tool that a hand holds is pressed on particles, one place after another.
 
-A tool takes off all particles in the box of its cleaning area, or of itself, while it touches the object
-(`ig2mj.states.definitions.cleaning`). Positions of the tool are those that cover most of what is left.
+Where a tool is pressed is planned in `ig2mj.planning.cleaning_strokes`.
 """
 
 from __future__ import annotations
 
 import collections
-import dataclasses
 from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
-from ig2mj.geometry.host_rotations import about_vertical, turn_onto
-from ig2mj.planning.cleaning_area import cleaning_area, is_covered
-from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.cleaning_area import is_covered
+from ig2mj.planning.cleaning_strokes import (
+    CLOSE,
+    FEW,
+    TURNS,
+    HeldTool,
+    Region,
+    Stroke,
+    plan_strokes,
+    regions_of,
+    turn_about,
+)
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp, put_down_others
 from ig2mj.planning.handing_over import hand_over
@@ -34,51 +40,18 @@ from ig2mj.planning.moves import (
 from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.placing import bring_out
-from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
-from ig2mj.planning.world import DirtSpot, PlannedWorld, Rotation, Stance, Vector
+from ig2mj.planning.world import DirtSpot, PlannedWorld, Stance, Vector
 
-ROUNDS, STROKES = 24, 8
-"""Stances from which an object is cleaned, and places of the tool for each, at most."""
-
-PRESSED, LIFTED, CLOSE, SLACK = 0.02, 0.06, 0.03, 0.0
-"""m that a tool is pressed into a face, and is lifted off it, also where there is less room; by which particles may be
-outside of its box."""
+ROUNDS = 24
+"""Stances from which an object is cleaned, at most."""
 
 PRESSES = 4
 """Agent steps that a tool is pressed: with each the hand is pulled farther into the face."""
 
-TURNS = (np.pi / 2, -np.pi / 2, np.pi)
-"""rad about a face's normal by which a tool is turned where it has no room otherwise."""
-
-TILTS = (-0.8, 0.8)
-"""rad about an axis in a face by which a tool is tilted."""
-
-LOWEST = -0.3
-"""Smallest z of the normal of a face that is cleaned."""
-
-OVER_TOP = 1.0
-"""m, height of dirt up to which a hand reaches over what it is on to the side that looks away."""
-
-NEAREST, STANCES, FEW = 8, 4, 4
-"""Particles that stances are looked for, stances for each, and strokes of each of which one has to have a way."""
-
-FAR = 0.6
-"""m beyond a hand's reach from which on particles are not looked at."""
-
-ENOUGH, OVERS = 6, 3
-"""Particles that are enough for a stance, and turns of a tool in which ways over a rim are looked for."""
-
-OPEN, ROOM, HIDDEN, HIDDEN_WORTH = np.array([0.12, 0.2, 0.3]), 0.06, 2, 0.25
-"""m before a face, and around it, that have to be free for a tool to come straight to it; particles that a stroke below
-something has to cover more than others to be chosen, and what these count."""
-
 TRIES = 4
 """Times that a particle is gone for."""
-
-ELSEWHERE = 0.12
-"""m between stances from which an object is cleaned."""
 
 BESIDE, MOVED = 0.12, 4
 """m from dirt within which things are moved away where no tool reaches it, and how many at most."""
@@ -118,11 +91,11 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 hand = hand_with(world, tool)
             spots = [spot for spot in world.dirt(predicate, name) if tried[spot.number] < TRIES]
             spots.sort(key=lambda spot: tried[spot.number])
-            plan = _plan(world, name, tool, hand, spots, visited)
+            plan = plan_strokes(world, name, tool, hand, spots, visited)
             while plan is None and (yield from open_around(world, name, opened)):
-                plan = _plan(world, name, tool, hand, spots, visited)
+                plan = plan_strokes(world, name, tool, hand, spots, visited)
             while plan is None and (yield from _clear_away(world, name, tool, spots, moved)) and tool in world.held:
-                plan = _plan(world, name, tool, hand, spots, ())
+                plan = plan_strokes(world, name, tool, hand, spots, ())
             if plan is None:
                 break
             if strayed(world, hand):
@@ -181,253 +154,16 @@ def _clear_away(
     return True
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Region:
-    """Where a held tool cleans when it is turned by `rotation`: corners of the part that cleans, and their box, m from
-    the hand's grasp point; `lifted`: m off a face from which on the tool is pressed on it."""
-
-    rotation: Rotation
-    corners: Float[np.ndarray, "n 3"]
-    low: Vector
-    high: Vector
-    lifted: float = LIFTED
-
-    @classmethod
-    def turned(cls, rotation: Rotation, corners: Float[np.ndarray, "n 3"]) -> _Region:
-        """`corners`: as the tool is held now."""
-        points = corners @ rotation.T
-        return cls(rotation, points, points.min(0), points.max(0))
-
-    def at(self, spot: DirtSpot) -> Vector:
-        """Grasp point of the hand when the tool is pressed on a particle."""
-        depth = float(np.ptp(self.corners @ spot.normal)) / 2
-        return spot.pos + spot.normal * (depth - PRESSED) - (self.low + self.high) / 2
-
-    def above(self, spot: DirtSpot) -> Vector:
-        """Grasp point of the hand right before."""
-        return self.at(spot) + self.lifted * spot.normal
-
-    def box(self, grip: Vector) -> tuple[Vector, Vector]:
-        """Lower and upper corner of what it cleans with the hand's grasp point at a place."""
-        return grip + self.low - SLACK, grip + self.high + SLACK
-
-
-class _HeldTool:
-    """A tool as a hand holds it now: the part that cleans, and spheres of hand and tool, m from the grasp point."""
-
-    def __init__(self, world: PlannedWorld, tool: str, hand: int):
-        self.world, self.tool, self.hand = world, tool, hand
-        area, self.out = cleaning_area(world, tool)
-        self.has_area = area is not None
-        self.corners = (world.vertices(tool) if area is None else area) - world.grip(hand)
-        self._spheres = world.spheres(*world.hand_axes(hand), holding=tool, hand=hand)
-
-    def spheres(self, rotation: Rotation) -> Float[np.ndarray, "S 4"]:
-        """Of hand and tool, if they were turned."""
-        return np.concatenate([self._spheres[:, :3] @ rotation.T, self._spheres[:, 3:]], axis=1)
-
-
-def _regions(held: _HeldTool, yaw: float, normal: Vector) -> list[_Region]:
-    """Turns of a tool with its box, for a robot that looks along `yaw`, rad: with its cleaning area towards the face;
-    as it is carried; of a hand that floats, turned about the normal and tilted, too, and close to the face, where there
-    is less room. A tilted tool cleans in a larger box."""
-    world, points = held.world, held.corners
-    carried = about_vertical(yaw - world.base[1])
-    facing = turn_onto(carried @ held.out, -normal) @ carried if held.has_area else carried
-    rotations = [facing, carried] if held.has_area else [facing]
-    if world.body.opening is not None:
-        return [_Region.turned(r, points) for r in rotations]
-    rotations += [_about(normal, angle) @ facing for angle in TURNS]
-    across = np.cross(normal, UP) if abs(normal[2]) < 0.9 else np.array([-np.sin(yaw), np.cos(yaw), 0.0])
-    across = across / np.linalg.norm(across)
-    tilts = [_about(axis, angle) for axis in (across, np.cross(normal, across)) for angle in TILTS]
-    rotations += [tilt @ facing for tilt in tilts] + [tilt @ _about(normal, np.pi / 2) @ facing for tilt in tilts]
-    found = [_Region.turned(r, points) for r in rotations]
-    return found + [dataclasses.replace(r, lifted=CLOSE) for r in found]
-
-
-def _about(axis: Vector, angle: float) -> Rotation:
-    """Rotation about a unit vector, rad."""
-    c, s = np.cos(angle), np.sin(angle)
-    x, y, z = axis
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + s * k + (1 - c) * (k @ k)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Stroke:
-    """A particle that a tool is pressed on, the number of its turn, and all particles that it takes off there.
-
-    `roofed`: it is on a loose thing with something before the face, so that the tool easily pushes the thing over.
-    """
-
-    spot: DirtSpot
-    turn: int
-    covered: list[DirtSpot]
-    roofed: bool = False
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class _CleanPlan:
-    """From where a tool is pressed on particles one after another."""
-
-    stance: Stance
-    strokes: list[_Stroke]
-
-    @property
-    def covered(self) -> list[DirtSpot]:
-        return [spot for stroke in self.strokes for spot in stroke.covered]
-
-    @property
-    def worth(self) -> float:
-        """Particles, of which those below something count less."""
-        return sum(len(s.covered) * (HIDDEN_WORTH if s.roofed else 1.0) for s in self.strokes)
-
-
-def _plan(
-    world: PlannedWorld, name: str, tool: str, hand: int, spots: Sequence[DirtSpot], visited: Sequence[Stance]
-) -> _CleanPlan | None:
-    """The stance from which most particles are in reach, of those near the nearest ones that were not visited."""
-    floor, obstacles = world.floor(), world.obstacles([tool])
-    spots = [s for s in spots if s.normal[2] > LOWEST]
-    away = world.away(world.spheres(*world.hand_axes(hand), holding=tool, hand=hand))
-    held, loose = _HeldTool(world, tool, hand), not world.domain.fixed(name)
-    best: _CleanPlan | None = None
-    seen = [*visited]
-    looked, enough = 0, min(ENOUGH, len(spots))
-    for aim in spots:
-        known = len(seen)
-        for stance in stances(world, hand, aim.pos + PRESSED * aim.normal, floor, away, STANCES):
-            if any(np.linalg.norm(np.subtract(stance.xy, v.xy)) < ELSEWHERE for v in seen):
-                continue
-            seen.append(stance)
-            plan = _From(held, stance, obstacles, loose).plan(spots)
-            if plan is not None and (best is None or plan.worth > best.worth):
-                best = plan
-            if best is not None and best.worth >= enough:
-                return best
-        looked += len(seen) > known
-        if looked == NEAREST:
-            break
-    return best
-
-
-class _From:
-    """Strokes of a tool from one stance."""
-
-    def __init__(self, held: _HeldTool, stance: Stance, obstacles: Obstacles, loose: bool):
-        """`obstacles`: all but the tool. loose: what is cleaned can move."""
-        self._loose = loose
-        self._held, self._world, self._hand, self._stance = held, held.world, held.hand, stance
-        self._obstacles = obstacles.about(stance.xy, *held.world.body.trunk)
-        self._start = held.world.carried(held.hand, stance)
-        self._known: dict[tuple[float, ...], list[tuple[_Region, np.ndarray]]] = {}
-
-    def plan(self, spots: Sequence[DirtSpot]) -> _CleanPlan | None:
-        """Places of the tool that cover most particles in reach, each next to the one before; None: the hand has a way
-        to none of the first ones."""
-        far = self._world.body.reach + FAR
-        spots = [s for s in spots if np.linalg.norm(s.pos[:2] - self._stance.xy) < far]
-        turns = self._turns(spots)
-        near = np.flatnonzero(turns >= 0)
-        if not len(near):
-            return None
-        roofed = self._roofed([spots[k] for k in near]) if self._loose else np.zeros(len(near), bool)
-        pos = np.array([s.pos for s in spots])
-        low, high = np.zeros((len(near), 3)), np.zeros((len(near), 3))
-        for row, k in enumerate(near):
-            region, _ = self._turned(spots[k].normal)[turns[k]]
-            low[row], high[row] = region.box(region.at(spots[k]))
-        covers = np.all((low[:, None] <= pos) & (pos <= high[:, None]), axis=-1)
-        covers[np.arange(len(near)), near] = True
-        left, strokes = np.ones(len(near), bool), list[_Stroke]()
-        taken = np.zeros(len(spots), bool)
-        while left.any() and len(strokes) < STROKES:
-            best = int(np.argmax(np.where(left, covers.sum(1) - HIDDEN * roofed, -np.inf)))
-            own = covers[best] & ~taken
-            spot = spots[near[best]]
-            strokes.append(
-                _Stroke(spot, int(turns[near[best]]), [spots[k] for k in np.flatnonzero(own)], bool(roofed[best]))
-            )
-            taken |= own
-            left &= ~covers[best][near]
-        strokes = _one_after_another(strokes)
-        if not any(self.way(stroke.spot, stroke.turn) for stroke in strokes[:FEW]):
-            return None
-        return _CleanPlan(self._stance, strokes)
-
-    def _roofed(self, spots: Sequence[DirtSpot]) -> Bool[np.ndarray, "n"]:
-        """Before which particles something is in the way of a tool that comes straight to the face."""
-        pos, normal = np.array([s.pos for s in spots]), np.array([s.normal for s in spots])
-        away = self._obstacles.distance(pos[:, None] + normal[:, None] * OPEN[:, None])
-        return np.asarray(away.min(axis=1) < ROOM)
-
-    def _turned(self, normal: Vector) -> list[tuple[_Region, np.ndarray]]:
-        """Turns of the tool for faces with a normal, and spheres of the hand with it."""
-        key = tuple(np.round(normal, 2))
-        if key not in self._known:
-            regions = _regions(self._held, self._stance.yaw, normal)
-            self._known[key] = [(r, self._held.spheres(r.rotation)) for r in regions]
-        return self._known[key]
-
-    def _turns(self, spots: Sequence[DirtSpot]) -> Int[np.ndarray, "n"]:
-        """The first turn of the tool in which the hand has room at each particle; -1: there is none."""
-        found = np.full(len(spots), -1)
-        here, shoulder = np.array(self._stance.xy), self._world.shoulder(self._hand, self._stance)
-        groups = collections.defaultdict[tuple, list[int]](list)
-        for k, s in enumerate(spots):
-            groups[tuple(np.round(s.normal, 2))].append(k)
-        for members in groups.values():
-            pos = np.array([spots[k].pos for k in members])
-            normal = np.array([spots[k].normal for k in members])
-            to_robot = (normal[:, 2] > 0.5) | (((here - pos[:, :2]) * normal[:, :2]).sum(1) > 0)
-            left = to_robot | (pos[:, 2] < OVER_TOP)
-            for turn, (region, spheres) in enumerate(self._turned(normal[0])):
-                if turn > OVERS:  # over the rim of a bathtub to its near inner side
-                    left &= to_robot
-                if not left.any():
-                    break
-                at = np.array([region.at(spots[k]) for k in members])
-                room = left & (np.linalg.norm(at - shoulder, axis=1) <= self._world.body.reach)
-                rows = np.flatnonzero(room)
-                room[rows] = self._obstacles.clear_at(spheres, at[rows] + region.lifted * normal[rows])
-                for row in np.flatnonzero(room & ~to_robot):
-                    room[row] = bool(self.way(spots[members[row]], turn))
-                found[np.array(members)[room]] = turn
-                left &= ~room
-        return found
-
-    def way(self, spot: DirtSpot, turn: int) -> list[Vector] | None:
-        """The hand's way to above a particle; None: there is none."""
-        world, hand = self._world, self._hand
-        region, spheres = self._turned(spot.normal)[turn]
-        follows = world.follows(hand, world.turned_hand(hand, region.rotation), self._obstacles, self._stance)
-        back = [UP, -ahead(self._stance.yaw), spot.normal]
-        return hand_path(self._obstacles, spheres, self._start, region.above(spot), back, follows=follows)
-
-
-def _one_after_another(strokes: list[_Stroke]) -> list[_Stroke]:
-    """Upper sides first, from one place to the next."""
-    left = sorted(strokes, key=lambda s: (s.roofed, s.spot.normal[2] < 0.5, -round(float(s.spot.pos[2]), 1)))
-    ordered = left[:1]
-    left = left[1:]
-    while left:
-        level = [s for s in left if s.roofed == left[0].roofed and abs(s.spot.pos[2] - left[0].spot.pos[2]) < 0.1]
-        nearest = min(level, key=lambda s: float(np.linalg.norm(s.spot.pos - ordered[-1].spot.pos)))
-        left.remove(nearest)
-        ordered.append(nearest)
-    return ordered
-
-
-def _program(world: PlannedWorld, tool: str, hand: int, stroke: _Stroke) -> Program:
+def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Program:
     """Presses the tool on a particle and lifts it; nothing where the hand has no way there. The planned turn of the
     tool is tried first."""
     obstacles, stance, spot = world.obstacles([tool], world.stance), world.stance, stroke.spot
-    held = _HeldTool(world, tool, hand)
-    regions = _regions(held, stance.yaw, spot.normal)
+    held = HeldTool(world, tool, hand)
+    regions = regions_of(held, stance.yaw, spot.normal)
     planned = regions[min(stroke.turn, len(regions) - 1)]
     if world.body.opening is not None:
-        regions = [planned, *(_turned(held, planned, spot.normal, angle) for angle in TURNS)]
+        turns = [turn_about(spot.normal, angle) @ planned.rotation for angle in TURNS]
+        regions = [planned, *(Region.turned(turn, held.corners) for turn in turns)]
     ways = 0
     for region in [planned, *(r for r in regions if r is not planned)]:
         if not world.reaches(hand, stance, region.at(spot)):
@@ -446,14 +182,7 @@ def _program(world: PlannedWorld, tool: str, hand: int, stroke: _Stroke) -> Prog
     return []
 
 
-def _turned(held: _HeldTool, region: _Region, normal: Vector, angle: float) -> _Region:
-    """The same tool turned about the normal of a face, rad."""
-    return _Region.turned(_about(normal, angle) @ region.rotation, held.corners)
-
-
-def _press(
-    world: PlannedWorld, tool: str, hand: int, region: _Region, spot: DirtSpot, way: Sequence[Vector]
-) -> Program:
+def _press(world: PlannedWorld, tool: str, hand: int, region: Region, spot: DirtSpot, way: Sequence[Vector]) -> Program:
     keeps = world.index(tool)
     quat, target = world.turned_hand(hand, region.rotation), region.at(spot)
     return [

@@ -140,22 +140,7 @@ class Obstacles:
 
     def clear(self, spheres: Float[np.ndarray, "M 4"]) -> bool:
         """Whether no sphere (x, y, z, radius) enters a piece."""
-        centre, radius = spheres[:, :3], spheres[:, 3:]
-        if self._body is not None:
-            x, y, wide, high = self._body
-            held = spheres[(spheres[:, 3] < HELD) & (spheres[:, 2] < high)]
-            if (np.hypot(held[:, 0] - x, held[:, 1] - y) < wide + held[:, 3]).any():
-                return False
-        low, high = (centre - radius).min(0), (centre + radius).max(0)
-        near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
-        if not len(near):
-            return True
-        meets = ((centre - radius)[:, None] < self._high[near]).all(-1)
-        meets &= ((centre + radius)[:, None] > self._low[near]).all(-1)
-        sphere, piece = np.nonzero(meets)
-        piece = near[piece]
-        away = np.einsum("pni,pi->pn", self._normal[piece], centre[sphere]) - self._offset[piece]
-        return bool((away.max(-1, initial=-1.0) >= radius[sphere, 0]).all())
+        return not self._enters(spheres[:, :3], spheres[:, 3]).any()
 
     def clear_at(
         self, spheres: Float[np.ndarray, "S 4"], points: Float[np.ndarray, "M 3"], together: int = 64

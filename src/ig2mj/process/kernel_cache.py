@@ -30,7 +30,7 @@ NEEDED = 32 * 2**20
 
 
 def folder_of_warp() -> pathlib.Path:
-    """Where Warp keeps kernels if it is not told otherwise: what it was told already, or its own folder."""
+    """Where Warp keeps kernels by its own settings: the folder that they name, or its default."""
     import warp as wp
 
     named = wp.config.kernel_cache_dir or os.environ.get("WARP_CACHE_PATH")
@@ -38,11 +38,12 @@ def folder_of_warp() -> pathlib.Path:
 
 
 def kernel_folder() -> pathlib.Path:
-    """Where kernels are kept: what Warp was told, IG2MJ_CACHE_DIR, or Warp's own folder; Warp adds its version."""
+    """Where kernels are kept: the folder that Warp's settings name, else one in IG2MJ_CACHE_DIR, else Warp's default.
+    Warp adds its version."""
     import warp as wp
 
-    told = wp.config.kernel_cache_dir or os.environ.get("WARP_CACHE_PATH")
-    return cache_folder() / "warp" if os.environ.get(CACHE_VARIABLE) and not told else folder_of_warp()
+    named = wp.config.kernel_cache_dir or os.environ.get("WARP_CACHE_PATH")
+    return cache_folder() / "warp" if os.environ.get(CACHE_VARIABLE) and not named else folder_of_warp()
 
 
 def usable_kernel_folder() -> pathlib.Path:

@@ -80,7 +80,7 @@ def _others() -> tuple[StateSpec, ...]:
 
 def states_class(added: Iterable[StateSpec]) -> type[ExtendedStates]:
     """The class of states that has also the fields of these; the same class for the same fields."""
-    return _with_fields(tuple(sorted(((n, kind) for spec in added for n, kind in spec.fields.items()), key=_first)))
+    return _class_with(tuple(sorted(((n, kind) for spec in added for n, kind in spec.fields.items()), key=_first)))
 
 
 def added_fields(states: ExtendedStates | type[ExtendedStates]) -> list[str]:
@@ -94,7 +94,7 @@ def _first(pair: tuple[str, Any]) -> str:
 
 
 @functools.cache
-def _with_fields(fields: tuple[tuple[str, Any], ...]) -> type[ExtendedStates]:
+def _class_with(fields: tuple[tuple[str, Any], ...]) -> type[ExtendedStates]:
     if not fields:
         return ExtendedStates
     body = {"__annotations__": dict(fields), "__module__": __name__, "__reduce__": _reduced, "__doc__": _DOC}
