@@ -15,6 +15,7 @@ from ig2mj.engine.view import blank_view, replace_fields
 from ig2mj.errors import EngineError, InputError
 from ig2mj.scene.paths import scene_folder
 from ig2mj.scene.scene import load_scene
+from ig2mj.tasks import relocation
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.bddl.binding import BindingError
 from ig2mj.tasks.bddl.task import bddl_task
@@ -148,3 +149,15 @@ def test_a_robot_of_a_task_outside_of_its_rooms_is_refused_before_anything_is_sa
     acts = dataclasses.replace(COOKING.robots["fetch"], pos=(-9.0, -1.65, 0.0))
     with pytest.raises(EngineError, match=r"robot 'fetch' starts at \(-9\.00, -1\.65, 0\.\d+\) m"):
         ig2mj.make(dataclasses.replace(COOKING, robots={"fetch": acts}), robot="fetch", engine="native")
+
+
+def test_a_home_of_ones_own_is_looked_at_each_time(monkeypatch, tmp_path):
+    """It may change while a process runs; homes that ship do not, and a training asks twice for each."""
+    asked = []
+    monkeypatch.setattr(relocation, "_difference", lambda task, folder: asked.append(folder.name) or "")
+    own = tmp_path / "mine"
+    shutil.copytree(scene_folder("small_home"), own)
+    task = dataclasses.replace(COOKING)
+    for home in (own, own, "maple", "maple"):
+        relocation.relocated(task, home)
+    assert asked == ["mine", "mine", "maple"]

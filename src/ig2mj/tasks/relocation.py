@@ -201,7 +201,8 @@ def relocated(task: Task, home: str | os.PathLike) -> Task:
     """The task in another home. Raises EngineError: it does not fit; says why. InputError: there is no such home."""
     folder = scene_folder(home)
     if scene_folder(task.home) != folder:
-        reason = _known_difference(_Asked(task, folder))
+        ships = folder.parent == SHIPPED_HOMES  # another home may change while the process runs
+        reason = _known_difference(_Asked(task, folder)) if ships else _difference(task, folder)
         if reason and task.fit is not None:
             return _moved(task, home_name(home), _spot(task.name, task.fit, _own(task), str(folder)))
         if reason:
