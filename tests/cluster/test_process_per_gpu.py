@@ -24,7 +24,7 @@ sys.exit(int(sys.argv[2]) if rank == "1" else 0)
 PARENT = """
 import os, sys
 from ig2mj.cluster.process_per_gpu import run_on_each_gpu
-sleeps = "import signal, sys, time; signal.signal(signal.SIGTERM, lambda *_: sys.exit(7)); print('up', flush=True)"
+sleeps = "import os, signal, sys, time; signal.signal(signal.SIGTERM, lambda *_: sys.exit(7)); os.write(1, b'up\\\\n')"
 sys.exit(run_on_each_gpu(["0", "1"], [sys.executable, "-c", sleeps + "; time.sleep(60)"], os.environ))
 """
 
