@@ -7,6 +7,7 @@ import pathlib
 import random
 
 from ..dataset.scene_writer import write_scene
+from ..objects.catalogue import find
 from ..plans.openings import make_plan
 from ..plans.plan import Plan, Room
 from ..shapes.surfaces import insides, tops
@@ -89,9 +90,12 @@ def build(root: pathlib.Path, seed: int = 0) -> pathlib.Path:
     return write_scene(root, home.plan, home.things, seed)
 
 
-def categories(seed: int = 0) -> list[str]:
-    """That the home needs of the dataset, halves not counted."""
-    return sorted({thing.category for thing in furnish(seed).things.things.values()})
+def models(seed: int = 0) -> dict[str, set[int]]:
+    """The models that the home needs of the dataset, halves not counted: category -> numbers."""
+    needed: dict[str, set[int]] = {}
+    for thing in furnish(seed).things.things.values():
+        needed.setdefault(thing.category, set()).add(thing.index % find(thing.category).count)
+    return needed
 
 
 def _pan_place(stove: Placed) -> tuple[float, float]:

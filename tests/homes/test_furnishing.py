@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import pathlib
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 from furnished_homes import home
+from ig2mj_homes.dataset.root import write_models
 from ig2mj_homes.dataset.scene_writer import scene_urdf
 from ig2mj_homes.dataset.shipped_homes import furnished, home_names
+from ig2mj_homes.furnish import small_home
 from ig2mj_homes.furnish.arrangement import AIR, Arrangement
 from ig2mj_homes.furnish.ground import CELL, Ground
 from ig2mj_homes.furnish.home import RULES
@@ -197,3 +202,12 @@ def test_an_unknown_home_is_refused_with_the_near_name():
     with pytest.raises(UnknownNameError, match="aspen"):
         furnished("aspn")
     assert len(home_names()) == 17
+
+
+def test_the_models_of_the_small_home_are_those_that_its_scene_places(tmp_path: pathlib.Path):
+    write_models(tmp_path, small_home.models())
+    scene = ElementTree.parse(small_home.build(tmp_path) / "urdf" / "small_home.urdf")
+    placed = {(link.get("category"), link.get("model")) for link in scene.iter("link") if link.get("bounding_box")}
+    written = {(folder.parent.name, folder.name) for folder in (tmp_path / "objects").glob("*/*")}
+    assert placed <= written
+    assert len(placed) == sum(map(len, small_home.models().values()))

@@ -72,15 +72,18 @@ def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, sce
     """Builds the home's dataset, converts it with checks and a report; number of failed checks."""
     from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.conversion import convert_scene
-    from ig2mj_homes.dataset.root import build_dataset
+    from ig2mj_homes.dataset.material_library import write_material_library
+    from ig2mj_homes.dataset.root import write_models
     from ig2mj_homes.furnish import small_home
 
     from ig2mj.viewer.offscreen import FreeView, render
 
-    report = step("building the source")
-    counts = build_dataset(dataset, only=small_home.categories(), jobs=jobs, progress=report)
+    step("building the source")(0, None, "")
+    needed = small_home.models()
+    write_models(dataset, needed)
+    write_material_library(dataset)
     small_home.build(dataset)
-    console.print(f"[bold]source[/]     {dataset}: {sum(counts.values())} models, scene '{name}'")
+    console.print(f"[bold]source[/]     {dataset}: {sum(map(len, needed.values()))} models, scene '{name}'")
 
     options = ConvertOptions(jobs=jobs, renderer=render, view=FreeView, progress=step("converting"))
     outcome = convert_scene(dataset, name, scene, options=options)
