@@ -30,6 +30,7 @@ import numpy as np
 from mujoco import mjx
 
 import ig2mj
+from benchmarks.harness.kernel_times import profiled
 from benchmarks.harness.results import keep_row, machine
 from benchmarks.speed.batch import device
 from ig2mj.scene.scene import LOOKS
@@ -118,6 +119,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--calls", type=int, default=10, help="calls of a variant in a round")
     parser.add_argument("--rows", type=pathlib.Path, help="file for the rows; default: they are printed")
+    parser.add_argument("--kernels", type=int, default=0, help="also print so many of each variant's longest kernels")
     args = parser.parse_args(argv)
     env = ig2mj.make(args.task, worlds=args.worlds, engine="warp")
     world = env.reset(0).batch.world
@@ -151,6 +153,9 @@ def main(argv: Sequence[str] | None = None) -> None:
             **compared(images.get(variant), images["base"]),
         }
         keep_row(row | device() | machine(-1), args.rows)
+    for variant, program in programs.items() if args.kernels else ():
+        print(f"{variant}:", flush=True)
+        profiled(lambda program=program: [program() for _ in range(args.calls)], args.calls, args.kernels, unit="call")
 
 
 if __name__ == "__main__":
