@@ -129,7 +129,7 @@ def test_slots_are_turned_to_the_surface(model, scene, view):
 
 
 def test_the_render_model_keeps_ids_and_moves_nothing(scene):
-    render = make_render_model(scene, 5)
+    render = make_render_model(scene, [mujoco.mjtGeom.mjGEOM_ELLIPSOID] * 5)
     assert (render.nv, render.nu, render.neq) == (0, 0, 0)
     assert [render.geom(g).name for g in range(scene.model.ngeom)] == [
         scene.model.geom(g).name for g in range(scene.model.ngeom)
@@ -138,7 +138,7 @@ def test_the_render_model_keeps_ids_and_moves_nothing(scene):
 
 
 def test_a_home_with_keyframes_and_meshes_has_a_render_model(tiny_home):
-    assert make_render_model(tiny_home, 0).ngeom == tiny_home.model.ngeom
+    assert make_render_model(tiny_home, ()).ngeom == tiny_home.model.ngeom
 
 
 # Pictures.

@@ -35,7 +35,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def host(scene) -> mujoco.MjModel:
-    return make_render_model(scene, 4)
+    return make_render_model(scene, [mujoco.mjtGeom.mjGEOM_ELLIPSOID] * 4)
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@
     camera = BatchCamera(engine, model, ["hand/eye"], width=128, height=128)
     step = jax.jit(lambda batch: camera(batch.world.physics, batch.world.view, batch.world.states))
 
-It needs no OpenGL, and runs on a CPU too. Objects are tinted by their states (`ig2mj.sensors.tints`), and dust, stains
-and water drops are drawn (`ig2mj.sensors.particle_slots`), in each world its own.
+It needs no OpenGL, and runs on a CPU too. Objects are tinted by their states (`ig2mj.sensors.tints`), and dust, stains,
+water drops and substances are drawn (`ig2mj.sensors.particle_slots`), in each world its own.
 
 Axes: W worlds, C cameras, Y rows, X columns, G geoms of the scene, S slots.
 """
@@ -39,9 +39,10 @@ from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, camera_id, check_request
 from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, mergeable, rigid_parts, robot_geoms, tables_of
-from ig2mj.sensors.particle_slots import Slots, fill_slots
+from ig2mj.sensors.particle_slots import fill_slots, slot_kinds
 from ig2mj.sensors.ray_cameras import sectors_of, set_rays, set_rows
 from ig2mj.sensors.render_model import BACKGROUND, make_render_model, mean_colours
+from ig2mj.sensors.slots import Slots
 from ig2mj.sensors.texture_filter import fit_textures
 from ig2mj.sensors.tints import STATES, SWITCHED_ON, UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
@@ -92,7 +93,7 @@ class BatchCamera:
           cameras: names.
           width, height: pixels, of every camera.
           rgb, depth, segmentation: what to make.
-          particles: S, the most particles drawn in a world.
+          particles: the most particles drawn in a world; with 0 no substances are drawn either.
           groups: geom groups that are seen.
           shadows: cast them; about twice the time.
           cull_backfaces: surfaces seen from behind are not there, so that a camera inside a geom sees through it; a
@@ -113,7 +114,9 @@ class BatchCamera:
             raise EngineError(f"the {engine.name} engine has no batched cameras (take the warp engine)")
         check_request(cameras, rays, (rgb, depth, segmentation), width, height, rows)
         self.engine, self.model = engine, model
-        self.width, self.height, self.slots = width, height, particles
+        self.width, self.height, self._particles = width, height, particles
+        kinds = slot_kinds(model, particles)
+        self.slots = len(kinds)
         self._wants, self._shown = (rgb, depth, segmentation), rows or (0, height)
         # lines of rays; where kernels are not those that we know all are cast
         self._lines = height if pins.obstacles() else self._shown[1] - self._shown[0]
@@ -123,7 +126,7 @@ class BatchCamera:
         if (self._lit or self._zooms) and (obstacle := pins.obstacles()):
             raise EngineError(f"lights and fields of view are the same in all worlds here: {obstacle}")
         sectors = [s.camera for s in self._sectors]
-        self._host = host = make_render_model(engine.scene, particles, sectors, looks, self._lit)
+        self._host = host = make_render_model(engine.scene, kinds, sectors, looks, self._lit)
         self.cameras = [camera_id(host, name) for name in cameras]
         if rgb and cameras:
             fit_textures(host, float(2 * np.tan(np.deg2rad(host.cam_fovy[self.cameras].min()) / 2) / height))
@@ -233,7 +236,7 @@ class BatchCamera:
         Raises:
           UnknownNameError: there is no such camera.
         """
-        slots = fill_slots(self.model, states, view, self.slots)
+        slots = fill_slots(self.model, states, view, self._particles)
         draw = draw or Draw()
         moved = self._moved(physics, slots, eyes or {}, rendered, draw)
         look = self._look(physics, states, slots) | self._of_draw(draw)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import atexit
 import weakref
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
 from ig2mj.process.opengl import images_of, use_opengl
 from ig2mj.sensors.images import NOTHING
-from ig2mj.sensors.particle_slots import Slots
 from ig2mj.sensors.render_model import BACKGROUND, SPARE_DIRECTIONS, SPARE_LIGHT
+from ig2mj.sensors.slots import Slots
 from ig2mj.worlds.draw import SPARE_LIGHTS
 
 NEAR, FAR = 0.01, 100.0
@@ -29,12 +30,18 @@ class Canvas:
     """See the module's text. `update` takes a state, `draw` draws it."""
 
     def __init__(
-        self, model: mujoco.MjModel, width: int, height: int, groups: np.ndarray, slots: int, shadows: bool = False
+        self,
+        model: mujoco.MjModel,
+        width: int,
+        height: int,
+        groups: np.ndarray,
+        slots: Sequence[mujoco.mjtGeom],
+        shadows: bool = False,
     ):
         """Starts OpenGL.
 
         Args:
-          model: to draw; its `vis` is changed. groups: [6] which geom groups are drawn. slots: the most particles.
+          model: to draw; its `vis` is changed. groups: [6] which geom groups are drawn. slots: types of shapes.
 
         Raises:
           MissingDependencyError: no OpenGL without a display works here.
@@ -43,11 +50,11 @@ class Canvas:
         use_opengl()
         from mujoco.rendering.classic import gl_context
 
-        self._model, self._size = model, (height, width)
+        self._model, self._size, self._kinds = model, (height, width), tuple(slots)
         size = model.vis.global_
         size.offwidth, size.offheight = max(width, size.offwidth), max(height, size.offheight)
         model.vis.quality.offsamples = 0  # a pixel sees one geom, at its centre
-        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + model.nsite + slots + 100)
+        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + model.nsite + len(slots) + 100)
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         self._scene.flags[list(map(int, _FLAGS_OFF))] = 0
         self._option = mujoco.MjvOption()
@@ -73,7 +80,7 @@ class Canvas:
         world: int,
         lights: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> None:
-        """Takes geoms, lights and a camera from `data`, and particles from the slots of a world.
+        """Takes geoms, lights and a camera from `data`, and shapes from the slots of a world.
 
         `lights`: colours and turns of the world's lights (`ig2mj.worlds.draw.Draw`); None: as the model has them.
         """
@@ -116,7 +123,7 @@ class Canvas:
         geom = scene.geoms[scene.ngeom]
         mujoco.mjv_initGeom(
             geom,
-            mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+            self._kinds[slot],
             slots.size[world, slot].astype(np.float64),
             slots.pos[world, slot].astype(np.float64),
             slots.rotation[world, slot].astype(np.float64).ravel(),

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.sensors.particle_slots import Slots
+from ig2mj.sensors.slots import Slots
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.draw import Draw
 

@@ -6,12 +6,12 @@
 | 1 | robots |
 | 3 | what has no known category |
 | 4 and on | the taxonomy's categories in alphabetical order: the same in every home |
-| 507, 508, 509 | dust, stains, water |
+| 507 to 511 | dust, stains, water drops, other substances, fire |
 
 | instance | what |
 |--:|---|
-| 0 | nothing, water, the world's own geoms |
-| 1 and on | objects in the scene's order, with their dust and stains; then agents |
+| 0 | nothing, water drops, streams, the world's own geoms |
+| 1 and on | objects in the scene's order, with what covers them, what they contain, and flames; then agents |
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from ig2mj.engine.view import Array
 from ig2mj.knowledge.taxonomy import categories
 from ig2mj.looks import visual_of
 from ig2mj.scene.scene import PLAIN, Scene
-from ig2mj.sensors.particle_slots import Slots
+from ig2mj.sensors.slots import Slots
 
 NUM_CLASSES, NUM_INSTANCES = 512, 1024
 BACKGROUND, ROBOT, OTHER, FIRST_CATEGORY = 0, 1, 3, 4
-PARTICLES = (507, 508, 509)
-"""Of dust, stains and water, in the order of `particle_slots.DUST`, `STAIN`, `WATER`."""
+SLOTS = (507, 508, 509, 510, 511)
+"""Of dust, stains, water, substances and fire, in the order of kinds in `ig2mj.sensors.slots`."""
 
 
 @functools.cache
@@ -44,7 +44,7 @@ def class_names() -> dict[int, str]:
     """What every class is called."""
     named = {number: name for name, number in class_of_category().items()}
     return {BACKGROUND: "nothing", ROBOT: "robot", OTHER: "other", **named} | dict(
-        zip(PARTICLES, ("dust", "stain", "water"), strict=True)
+        zip(SLOTS, ("dust", "stain", "water", "substance", "fire"), strict=True)
     )
 
 
@@ -88,10 +88,10 @@ def looked_up(
 
 
 def classes_of_slots(slots: Slots) -> Int[Array, "W S"]:
-    """Class of every particle that is drawn."""
-    return jnp.asarray(PARTICLES, jnp.int32)[jnp.clip(jnp.asarray(slots.kind), 0)]
+    """Class of everything that is drawn in slots."""
+    return jnp.asarray(SLOTS, jnp.int32)[jnp.clip(jnp.asarray(slots.kind), 0)]
 
 
 def instances_of_slots(slots: Slots) -> Int[Array, "W S"]:
-    """Instance of what every particle sticks to."""
+    """Instance of what everything in slots belongs to."""
     return jnp.asarray(slots.owner) + 1

@@ -28,8 +28,9 @@ from ig2mj.scene.geom_groups import HIDDEN_GROUP, VISIBLE_GROUPS
 from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.gl_canvas import Canvas
 from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, camera_id, check_request
-from ig2mj.sensors.particle_slots import Slots, fill_slots
+from ig2mj.sensors.particle_slots import fill_slots, slot_kinds
 from ig2mj.sensors.render_model import mean_colours
+from ig2mj.sensors.slots import Slots
 from ig2mj.sensors.tints import STATES, SWITCHED_ON, UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
@@ -68,7 +69,9 @@ class NativeCamera:
         check_request(cameras, rays, (rgb, depth, segmentation), width, height, rows)
         self._rows = slice(*rows) if rows is not None else slice(None)
         self.engine, self.model = engine, model
-        self.width, self.height, self.slots = width, height, particles
+        self.width, self.height, self._particles = width, height, particles
+        self._kinds = slot_kinds(model, particles)
+        self.slots = len(self._kinds)
         self._wants, self._shadows, self._patterns = (rgb, depth, segmentation), shadows, tuple(rays)
         self._visual = visual_of(engine.scene, looks)
         self._drawn = copy.copy(self._visual.model)  # its colours change with the states
@@ -77,7 +80,7 @@ class NativeCamera:
         self._visible = np.isin(np.arange(mujoco.mjNGROUP), list(groups)).astype(np.uint8)
         if self._visible[HIDDEN_GROUP]:
             raise EngineError(f"geom group {HIDDEN_GROUP} is never seen (take the groups 0 to {HIDDEN_GROUP - 1})")
-        self._owner = np.concatenate([self._visual.owner, np.full(particles, NOTHING)]).astype(np.int32)
+        self._owner = np.concatenate([self._visual.owner, np.full(self.slots, NOTHING)]).astype(np.int32)
         self._plain = mean_colours(self._drawn, np.arange(self._drawn.ngeom))
         self._material, self._group = self._drawn.geom_matid.copy(), self._drawn.geom_group.copy()
         self._fovy = self._drawn.cam_fovy.copy()
@@ -148,7 +151,7 @@ class NativeCamera:
 
     def _look_fn(self, states: ExtendedStates, view: PhysicsView) -> tuple[Any, Slots]:
         """Tints of objects, and particles."""
-        return tints(self.model, states), fill_slots(self.model, states, view, self.slots)
+        return tints(self.model, states), fill_slots(self.model, states, view, self._particles)
 
     def _take_colours(self, live: mujoco.MjModel) -> None:
         """Gives geoms and materials the colours of a world's model; what the looks hide or add keeps theirs."""
@@ -198,7 +201,7 @@ class NativeCamera:
         lights: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
         if self._canvas is None:
-            self._canvas = Canvas(self._drawn, self.width, self.height, self._visible, self.slots, self._shadows)
+            self._canvas = Canvas(self._drawn, self.width, self.height, self._visible, self._kinds, self._shadows)
         keep = data.cam_xpos[camera].copy(), data.cam_xmat[camera].copy()
         try:
             if pose is not None:

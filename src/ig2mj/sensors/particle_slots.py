@@ -1,4 +1,5 @@
-"""Which particles a camera shows: the first `count` that exist, of dust, stains and water, in every world.
+"""What fills the slots of a camera: the first `count` particles of dust, stains and water that exist, in every world,
+then substances and fire (`ig2mj.sensors.substance_slots`).
 
 Axes: W worlds, N particles of all kinds, S slots.
 """
@@ -7,13 +8,14 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
-from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_rotate, quat_to_matrix
-from ig2mj.sensors.render_model import NOWHERE
+from ig2mj.sensors import substance_slots
+from ig2mj.sensors.slots import DUST, STAIN, WATER, Slots, free_slots
 from ig2mj.sensors.tints import DUST_COLOUR, STAIN_COLOUR, WATER_COLOUR
 from ig2mj.states.definitions.water import DROP_RADIUS, NUM_DROPS
 from ig2mj.states.model import StateModel
@@ -25,29 +27,19 @@ from ig2mj.states.particles import (
 )
 from ig2mj.states.world import ExtendedStates
 
-DUST, STAIN, WATER = range(3)
 
-
-@struct.dataclass
-class Slots:
-    """Ellipsoids to draw.
-
-    Attributes:
-      pos, rotation: world frame. size: half axes, m. colour: rgb, 0..1.
-      owner: the object that is dirty, -1 none. kind: one of `DUST`, `STAIN`, `WATER`, or -1 where the slot is free.
-      body: that the particle sticks to; 0, the world, for water.
-    """
-
-    pos: Float[Array, "W S 3"]
-    rotation: Float[Array, "W S 3 3"]
-    size: Float[Array, "W S 3"]
-    colour: Float[Array, "W S 3"]
-    owner: Int[Array, "W S"]
-    kind: Int[Array, "W S"]
-    body: Int[Array, "W S"]
+def slot_kinds(model: StateModel, count: int) -> tuple[mujoco.mjtGeom, ...]:
+    """Of all slots of a camera that shows so many particles: those of particles, then `substance_slots`."""
+    return (mujoco.mjtGeom.mjGEOM_ELLIPSOID,) * count + substance_slots.shape_kinds(model, count)
 
 
 def fill_slots(model: StateModel, states: ExtendedStates, view: PhysicsView, count: int) -> Slots:
+    """So many particles, then substances and fire, in the order of `slot_kinds`. Pure."""
+    particles, others = _particles(model, states, view, count), substance_slots.shapes(model, states, view, count)
+    return particles if others is None else jax.tree.map(lambda *x: jnp.concatenate(x, axis=1), particles, others)
+
+
+def _particles(model: StateModel, states: ExtendedStates, view: PhysicsView, count: int) -> Slots:
     """The particles that exist, in the order dust, stains, water; those after `count` are not shown. Pure."""
     p, worlds = model.parameters, states.temperature.shape[0]
     dust_rows, stain_rows, sources = len(p.dust_rows), len(p.stain_rows), len(p.water_object)
@@ -76,17 +68,8 @@ def fill_slots(model: StateModel, states: ExtendedStates, view: PhysicsView, cou
         [dust_rows * NUM_PARTICLES, stain_rows * NUM_PARTICLES, sources * NUM_DROPS],
     )
 
-    blank = Slots(
-        pos=jnp.full((worlds, count, 3), jnp.array(NOWHERE, jnp.float32)),
-        rotation=jnp.full((worlds, count, 3, 3), jnp.eye(3)),
-        size=jnp.full((worlds, count, 3), 1e-4, jnp.float32),
-        colour=jnp.zeros((worlds, count, 3), jnp.float32),
-        owner=jnp.full((worlds, count), -1, jnp.int32),
-        kind=jnp.full((worlds, count), -1, jnp.int32),
-        body=jnp.zeros((worlds, count), jnp.int32),
-    )
     if not len(kinds):
-        return blank
+        return free_slots(worlds, count)
 
     def rows(dust: Array, stain: Array, water: Array, width: int) -> Array:
         return jnp.concatenate([jnp.asarray(a).reshape(worlds, -1, width) for a in (dust, stain, water)], axis=1)
@@ -103,7 +86,7 @@ def fill_slots(model: StateModel, states: ExtendedStates, view: PhysicsView, cou
     upright = jnp.broadcast_to(jnp.array([0.0, 0.0, 1.0]), (*drops, 3))
     normal = of_slots(states.dust.normal, states.stain.normal, upright, 3)
     falls = jnp.asarray(kinds)[at, None] == WATER  # in the world frame
-    found = Slots(
+    return Slots(
         pos=jnp.where(falls, pos, origin + quat_rotate(turn, pos)),
         rotation=quat_to_matrix(_turn_to(jnp.where(falls, normal, quat_rotate(turn, normal)))),
         size=jnp.asarray(sizes)[at],
@@ -111,12 +94,7 @@ def fill_slots(model: StateModel, states: ExtendedStates, view: PhysicsView, cou
         owner=jnp.asarray(owners)[at],
         kind=jnp.asarray(kinds)[at],
         body=body[..., 0],
-    )
-
-    def where_shown(value: Array, none: Array) -> Array:
-        return jnp.where(shown.reshape(*shown.shape, *(1,) * (value.ndim - 2)), value, none)
-
-    return jax.tree.map(where_shown, found, blank)
+    ).where(shown)
 
 
 def _shown(there: Bool[Array, "W N"], count: int) -> tuple[Bool[Array, "W S"], Int[Array, "W S"]]:

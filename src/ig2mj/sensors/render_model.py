@@ -1,7 +1,7 @@
 """The scene as cameras see it: a model of its own that nothing moves in, so that images cost physics nothing.
 
 It has the scene's bodies, geoms, cameras, lights and materials with the scene's ids, no joints, and behind the last
-geom a number of free *slots*: small ellipsoids that become particles.
+geom a number of free *slots*: small shapes that become particles, surfaces of contents, spots, streams and flames.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ assert len(SPARE_DIRECTIONS) == SPARE_LIGHTS
 
 
 def make_render_model(
-    scene: Scene, slots: int, cameras: Sequence[str] = (), looks: str = PLAIN, lights: bool = False
+    scene: Scene, slots: Sequence[mujoco.mjtGeom], cameras: Sequence[str] = (), looks: str = PLAIN, lights: bool = False
 ) -> mujoco.MjModel:
     """Compiles the render model; behind the scene's geoms come those of its looks (`ig2mj.looks`), then the slots.
 
     Args:
+      slots: types of their geoms.
       cameras: names of cameras that are added behind the scene's own, for poses that are given with each image.
       lights: behind all others come `SPARE_LIGHTS`, and one more whose colour is that of the light at the camera.
 
@@ -53,10 +54,10 @@ def make_render_model(
         spec.delete(joint)
     decorate(spec, scene, looks, fine=False)
     body = spec.worldbody.add_body(name="ig2mj/particles")
-    for k in range(slots):
+    for k, kind in enumerate(slots):
         body.add_geom(
             name=f"ig2mj/particle_{k}",
-            type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+            type=kind,
             size=[0.01, 0.01, 0.01],
             pos=list(NOWHERE),
             contype=0,
@@ -76,7 +77,7 @@ def make_render_model(
         )
     model = spec.compile()
     known = scene.model
-    if model.ngeom < known.ngeom + slots or (model.geom_bodyid[: known.ngeom] != known.geom_bodyid).any():
+    if model.ngeom < known.ngeom + len(slots) or (model.geom_bodyid[: known.ngeom] != known.geom_bodyid).any():
         raise EngineError(f"scene '{scene.name}' in {scene.folder} changed since it was loaded (load it again)")
     return model
 

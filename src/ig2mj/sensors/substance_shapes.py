@@ -1,8 +1,8 @@
 """Where substances are seen in one world: levels of contents, streams, what covers objects, flames. On the host.
 
-A level is a flat shape in the container's inside, at the height below which as much of the inside is as it holds. A
-stream is a chain of points from the lowest place of the rim down to the first box or the floor below. Viewers draw both
-(`ig2mj.viewer.substance_marks`).
+Levels are those of `ig2mj.sensors.content_levels`. A stream is a chain of points from the lowest place of the rim down
+to the first box or the floor below. Viewers draw them (`ig2mj.viewer.substance_marks`); for cameras there is
+`ig2mj.sensors.substance_slots`.
 
 Axes: N shapes, P points.
 """
@@ -10,29 +10,20 @@ Axes: N shapes, P points.
 from __future__ import annotations
 
 import dataclasses
+import functools
 
+import jax
 import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import PhysicsView
-from ig2mj.geometry.poses import quat_rotate
+from ig2mj.sensors import content_levels
+from ig2mj.sensors.substance_slots import spot_radii
 from ig2mj.states.model import StateModel
 from ig2mj.states.substances import streams
 from ig2mj.states.substances.model import NUM_POINTS, SubstanceModel
 from ig2mj.states.substances.volume import CONTAINS
 from ig2mj.states.world import ExtendedStates
-
-THIN = 0.0015
-"""m: half the thickness of a level."""
-
-SHRINK = 0.96
-"""Of a level's half sizes, so that it does not stand out of walls."""
-
-FULL_BOX = 0.88
-"""Share of its bounding rectangle from which a level is a rectangle, not an ellipse."""
-
-STREAM_RADIUS = 0.004
-"""m."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,45 +68,26 @@ def mixed_colour(found: SubstanceModel, litres: Float[np.ndarray, "U"]) -> tuple
 
 def levels(model: StateModel, states: ExtendedStates, view: PhysicsView, world: int = 0) -> list[Level]:
     """The surfaces of contents, of containers that hold something."""
-    found = model.substances
-    if found is None:
+    if model.substances is None or not len(model.substances.containers.body):
         return []
-    volume, made = np.asarray(states.volume)[world], list[Level]()
-    for row in np.flatnonzero(volume.sum(-1) >= CONTAINS):
-        body = found.containers.body[row]
-        pos, quat = np.asarray(view.body_pos)[world, body], np.asarray(view.body_quat)[world, body]
-        points = pos + np.asarray(quat_rotate(quat, found.containers.filling[row]))
-        share = float(np.clip(volume[row].sum() / found.containers.litres[row], 0.02, 1.0))
-        height = float(np.quantile(points[:, 2], share))
-        distance = np.abs(points[:, 2] - height)
-        near = points[distance <= np.sort(distance)[min(len(points) - 1, max(12, len(points) // 14))] + 1e-6, :2]
-        turn, middle, half, area = _rectangle(near)
-        axes = np.eye(3)
-        axes[:2, :2] = turn
-        colour = mixed_colour(found, volume[row])
-        size = (float(SHRINK * half[0]), float(SHRINK * half[1]))
-        made.append(Level(int(row), np.array([*middle, height]), axes, size, area > FULL_BOX, colour))
-    return made
+    found = jax.tree.map(lambda x: np.asarray(x)[world], _levels(model)(states, view))
+    flat = content_levels.rectangles(model)
+    return [
+        Level(
+            container=int(row),
+            pos=found.pos[row],
+            axes=found.axes[row],
+            half=(float(found.half[row, 0]), float(found.half[row, 1])),
+            rectangle=bool(flat[row]),
+            rgb=(float(found.rgb[row, 0]), float(found.rgb[row, 1]), float(found.rgb[row, 2])),
+        )
+        for row in np.flatnonzero(found.there)
+    ]
 
 
-def _rectangle(points: Float[np.ndarray, "P 2"]) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """The least rectangle round points: axes as columns, middle, half sizes, and the share that their hull takes."""
-    import scipy.spatial  # takes as long as all of this package
-
-    try:
-        covered = float(scipy.spatial.ConvexHull(points).volume)
-    except scipy.spatial.QhullError:
-        covered = 0.0
-    best: tuple[float, np.ndarray, np.ndarray, np.ndarray] | None = None
-    for angle in np.radians(np.arange(0, 90, 5)):
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        local = points @ turn
-        low, high = local.min(0), local.max(0)
-        area = float(np.prod(high - low))
-        if best is None or area < best[0] - 1e-9:
-            best = area, turn, turn @ ((low + high) / 2), (high - low) / 2
-    assert best is not None
-    return best[1], best[2], best[3], covered / max(best[0], 1e-12)
+@functools.lru_cache(maxsize=8)
+def _levels(model: StateModel):
+    return jax.jit(functools.partial(content_levels.levels, model))
 
 
 def streams_of(model: StateModel, states: ExtendedStates, view: PhysicsView, world: int = 0) -> list[Stream]:
@@ -160,15 +132,12 @@ def spots(model: StateModel, states: ExtendedStates, world: int = 0) -> list[Spo
     found = model.substances
     if found is None:
         return []
-    bits, made = np.asarray(states.coat)[world], list[Spots]()
+    bits, radii, made = np.asarray(states.coat)[world], spot_radii(model), list[Spots]()
     for row, column in np.argwhere(bits > 0):
         here = (int(bits[row, column]) >> np.arange(NUM_POINTS)) & 1 > 0
         obj, kind = int(found.covered[row]), found.substances[column]
-        size = float(np.median(model.tables.object_bbox[obj]))
-        wide = 0.12 if kind.kind != "visual" else 0.08
-        radius = float(np.clip(wide * size, 0.006, 0.12))
         body, pos, normal = found.body[row][here], found.pos[row][here], found.normal[row][here]
-        made.append(Spots(kind.name, obj, body, pos, normal, radius, kind.colour))
+        made.append(Spots(kind.name, obj, body, pos, normal, float(radii[row, column]), kind.colour))
     return made
 
 

@@ -1,6 +1,6 @@
 """How substances look in images, videos and windows for people: levels of contents, streams, spots, flames.
 
-They are marks (`ig2mj.viewer.state_marks`), in no robot's camera.
+They are marks (`ig2mj.viewer.state_marks`). Robots' cameras show simpler ones (`ig2mj.sensors.substance_slots`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ import numpy as np
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.poses import quat_rotate
-from ig2mj.sensors.substance_shapes import STREAM_RADIUS, THIN, burning, levels, spots, streams_of
+from ig2mj.sensors.content_levels import THIN
+from ig2mj.sensors.substance_shapes import burning, levels, spots, streams_of
+from ig2mj.sensors.substance_slots import LONGER, SPOT_THICKNESS, STREAM_RADIUS
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.viewer.state_marks import Mark
@@ -38,13 +40,13 @@ def substance_marks(
             if half > 1e-5:
                 rgba = (*stream.rgb, ALPHA["stream"])
                 axes = _towards((b - a) / (2 * half))
-                size = (STREAM_RADIUS, STREAM_RADIUS, 1.4 * half)
+                size = (STREAM_RADIUS, STREAM_RADIUS, LONGER * half)
                 found.append(Mark(kinds.mjGEOM_ELLIPSOID, size, (a + b) / 2, axes, rgba))
     for spot in spots(model, states, world):
         body_pos, body_quat = (np.asarray(f)[world, spot.body] for f in (view.body_pos, view.body_quat))
         pos = body_pos + np.asarray(quat_rotate(body_quat, spot.pos))
         normal = np.asarray(quat_rotate(body_quat, spot.normal))
-        size = (spot.radius, spot.radius, 0.0015)
+        size = (spot.radius, spot.radius, SPOT_THICKNESS)
         found += [
             Mark(kinds.mjGEOM_ELLIPSOID, size, p, _towards(n), (*spot.rgb, ALPHA["spot"]))
             for p, n in zip(pos, normal, strict=True)

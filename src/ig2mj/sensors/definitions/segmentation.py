@@ -11,7 +11,7 @@ from ig2mj.engine.view import Array
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors import labels
 from ig2mj.sensors.base import Percept, Sensor, Setup, Space
-from ig2mj.sensors.particle_slots import Slots
+from ig2mj.sensors.slots import Slots
 
 
 def _segmentation(

@@ -91,13 +91,21 @@ class Containers:
         """Poses of their bodies [W, C]."""
         return Frames.of(view.body_pos, view.body_quat, self.body)
 
+    @property
+    def across(self) -> Float[np.ndarray, "C 3"]:
+        """Unit, in the plane of the opening, at right angles to `side`."""
+        return np.cross(self.normal, self.side).astype(np.float32)
+
+    def tilted(self, up: Numbers) -> tuple[Float[Array, "W C"], Float[Array, "W C"]]:
+        """Rows and columns of `capacity`, with parts of them, of containers as they stand; a column is from 0 to
+        `DIRECTIONS`. `up`: the direction upwards in the frames of their bodies."""
+        along, x, y = (dot(up, numbers(axis)) for axis in (self.normal, self.side, self.across))
+        tilt = jnp.arctan2(jnp.sqrt(x * x + y * y), along) * ((TILTS - 1) / np.pi)
+        return tilt, jnp.mod(jnp.arctan2(y, x) * (DIRECTIONS / (2 * np.pi)), DIRECTIONS)
+
     def holds(self, view: PhysicsView) -> Float[Array, "W C"]:
         """Litres that stay in each container as it stands."""
-        up = self.frames(view).up()
-        across = np.cross(self.normal, self.side).astype(np.float32)
-        along, x, y = (dot(up, numbers(axis)) for axis in (self.normal, self.side, across))
-        tilt = jnp.arctan2(jnp.sqrt(x * x + y * y), along) * ((TILTS - 1) / np.pi)
-        turn = jnp.mod(jnp.arctan2(y, x) * (DIRECTIONS / (2 * np.pi)), DIRECTIONS)
+        tilt, turn = self.tilted(self.frames(view).up())
         row = jnp.clip(jnp.floor(tilt), 0, TILTS - 2).astype(int)
         column = jnp.clip(jnp.floor(turn), 0, DIRECTIONS - 1).astype(int)
         table, own = self.capacity.reshape(len(self.body), -1), np.arange(len(self.body))

@@ -75,8 +75,8 @@ def flowed(
     """
     start = EventStep.start(model, states, view, relations)
     stand = volume.standing(model, view)
-    first = volume.outlets(start, stand)
-    ends = volume.streams(start, first.chosen)
+    first = volume.outlets(model, states, stand)
+    ends = volume.streams(model, view, first.chosen)
     applies = applying.exist(model)
     there = applying.dipped(start) if applies else None
     others = jnp.all(jnp.stack([washing.rests(start), *(spec.idle(start) for spec in _others(model) if spec.idle)]))
@@ -88,7 +88,7 @@ def flowed(
     def one(now: tuple) -> tuple:
         count, _, before, made = now
         step = start.having(**dict(zip(FIELDS, before, strict=True)))
-        out = volume.outlets(step, stand)
+        out = volume.outlets(model, step.states, stand)
         complete = others & jnp.all(out.chosen == first.chosen)
         step = volume.poured(step, out, ends)
         if there is not None:

@@ -148,13 +148,12 @@ def update(step: EventStep) -> EventStep:
     """One control step of all volumes."""
     if not has_outlets(step.model):
         return step
-    out = outlets(step, standing(step.model, step.view))
-    return poured(step, out, streams(step, out.chosen))
+    out = outlets(step.model, step.states, standing(step.model, step.view))
+    return poured(step, out, streams(step.model, step.view, out.chosen))
 
 
-def outlets(step: EventStep, stand: Standing) -> Outlets:
-    """What flows in this step."""
-    model, states = step.model, step.states
+def outlets(model: StateModel, states: ExtendedStates, stand: Standing) -> Outlets:
+    """What flows in a step that begins with these states."""
     gone = drained(model, states.volume)
     volume = states.volume - gone
     flow, from_taps = outflow(model, states, volume, stand), taps(model, states.toggled_on)
@@ -193,9 +192,8 @@ def has_outlets(model: StateModel) -> bool:
     return bool(len(of(model).containers.body) or len(model.parameters.water_object))
 
 
-def streams(step: EventStep, chosen: Bool[Array, "W K E"]) -> Streams:
+def streams(model: StateModel, view: PhysicsView, chosen: Bool[Array, "W K E"]) -> Streams:
     """Where the streams of the chosen outlets end."""
-    model, view = step.model, step.view
     containers = of(model).containers
     worlds, most = chosen.shape[:2]
 
