@@ -20,6 +20,7 @@ from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import SHIPPED_HOMES, shipped_homes
 from ig2mj.scene.rooms import load_rooms
 from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.sensors.native_camera import NativeCamera
 from ig2mj.viewer.captions import caption
 from ig2mj.viewer.offscreen import FreeView, render
 from ig2mj.viewer.overview import home_overview
@@ -158,7 +159,7 @@ def states() -> None:
 
 
 def substances() -> None:
-    """Milk in a bowl, and a table with mud on which a newspaper burns."""
+    """Milk in a bowl, and a table with mud on which a newspaper burns: for people, and in cameras of robots."""
     names = ["water", "milk", "mud"]
     sim = ig2mj.Simulation(load_scene("birch", objects=["newspaper", "with:on_fire"], substances=names))
     for condition in (
@@ -168,12 +169,28 @@ def substances() -> None:
         ("on_fire", "newspaper_0"),
     ):
         sim.set_predicate(*condition)
-    tiles = []
-    for name, distance, elevation in (("bowl_0", 0.6, -40.0), ("newspaper_0", 1.2, -20.0)):
-        at = np.asarray(sim.view.object_com)[0, sim.scene.object_index(name)]
+    tiles, seen = [], []
+    name = sim.scene.model.camera(0).name
+    camera = NativeCamera(sim.engine, sim.state_model, [name], width=480, height=360, looks="day")
+    for thing, distance, elevation in (("bowl_0", 0.6, -40.0), ("newspaper_0", 1.2, -20.0)):
+        at = np.asarray(sim.view.object_com)[0, sim.scene.object_index(thing)]
         view = FreeView((float(at[0]), float(at[1]), float(at[2])), distance, 120.0, elevation)
         tiles.append(sim.render(view, width=480, height=360))
-    sheet(tiles, 2).save(FOLDER / "gallery_substances.jpg", quality=QUALITY)
+        images = camera(sim.physics, sim.view, sim.states, {name: eye(at, distance, 120.0, elevation)})
+        seen.append(caption(np.asarray(images.rgb)[0, 0], "camera of a robot"))
+    camera.close()
+    sheet([*tiles, *seen], 2).save(FOLDER / "gallery_substances.jpg", quality=QUALITY)
+
+
+def eye(at: np.ndarray, distance: float, azimuth: float, elevation: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pose [1, 3] and [1, 4] of a camera that stands as a `FreeView` does."""
+    a, e = np.radians(azimuth), np.radians(elevation)
+    back = -np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, np.stack([right, np.cross(back, right), back], axis=1).ravel())
+    return (at + distance * back)[None], quat[None]
 
 
 def into_room(sim: ig2mj.Simulation, index: int) -> np.ndarray:

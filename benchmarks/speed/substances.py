@@ -3,17 +3,20 @@
     python -m benchmarks.speed.substances native [--seconds 3]
     python -m benchmarks.speed.substances batch [--worlds 4096] [--engine warp]
     python -m benchmarks.speed.substances pour [--worlds 10000] [--engine warp]
+    python -m benchmarks.speed.substances trace --folder FOLDER [--case substances] [--worlds 4096] [--engine warp]
 
 `native`: microseconds of the states of one control step of birch on the native engine: without substances, with 16
 containers and 6 substances where nothing flows, and where a quarter of the containers overflow; at rest, while one
 loose object moves elsewhere, and while all objects move. `batch`: seconds of
 rollouts of birch without substances, with them, and with 64 transition rules besides; a quarter of the containers of
 each world overflow. `pour`: worlds in which a litre is poured from a jug into a glass of 0.3 litres; the largest
-relative change of the sum over jug, glass and what was lost, and how far the engine is from the native one.
+relative change of the sum over jug, glass and what was lost, and how far the engine is from the native one. `trace`:
+JAX's profile of one rollout of a case of `batch`, written into a folder.
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import json
@@ -178,6 +181,28 @@ def batch(worlds: int = 4096, engine: str = "warp", only: tuple[str, ...] = ()) 
             keep_row({**row, **provenance(), **machine(-1)}, None)
 
 
+def trace(folder: pathlib.Path, case: str = "substances", worlds: int = 4096, engine: str = "warp") -> None:
+    """A profile of one rollout, for TensorBoard or Perfetto.
+
+    Args:
+      case: "without", "substances" or "64 rules".
+    """
+    with tempfile.TemporaryDirectory() as rules_folder:
+        if case == "64 rules":
+            load_transitions(_rules_file(pathlib.Path(rules_folder)))
+        scene = _scene(() if case == "without" else SUBSTANCES)
+    rules = Rules.of_scene(scene)
+    core = Core(make_engine(engine, scene, worlds), rules)
+    batch = core.start(0)
+    for call in range(3):
+        if case != "without":
+            world = dataclasses.replace(batch.world, states=_overflowing(rules, batch.world.states))
+            batch = dataclasses.replace(batch, world=world)
+        with jax.profiler.trace(folder) if call == 2 else contextlib.nullcontext():
+            batch, _ = core.rollout(batch, jnp.zeros(()), _nothing, STEPS)
+            jax.block_until_ready(batch.world.states.temperature)
+
+
 def _nothing(batch, carry):
     return None, carry
 
@@ -209,4 +234,4 @@ def pour(worlds: int = 10000, engine: str = "warp") -> None:
 
 
 if __name__ == "__main__":
-    tyro.extras.subcommand_cli_from_dict({"native": native, "batch": batch, "pour": pour})
+    tyro.extras.subcommand_cli_from_dict({"native": native, "batch": batch, "pour": pour, "trace": trace})

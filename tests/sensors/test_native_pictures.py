@@ -14,7 +14,7 @@ from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process.opengl import GL_BACKENDS, probe_gl
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.sensors.gl_canvas import Canvas
-from ig2mj.sensors.labels import PARTICLES, class_names, class_of_category
+from ig2mj.sensors.labels import SLOTS, class_names, class_of_category
 from ig2mj.sensors.native_camera import NativeCamera
 from ig2mj.states import particles
 
@@ -138,7 +138,7 @@ def test_dust_is_of_its_class_and_of_the_instance_it_lies_on(world):
     )
     world.states = dataclasses.replace(world.states, dust=dust)
     seen = world.see("seg", "ins_seg", width=256, height=256)
-    dirty = seen["seg"] == PARTICLES[0]
+    dirty = seen["seg"] == SLOTS[0]
     assert dirty[0].any() and not dirty[1].any()
     assert (seen["ins_seg"][dirty] == table + 1).all()
 
@@ -163,7 +163,7 @@ def test_leaving_out_what_is_out_of_view_changes_no_pixel(tiny_home_folder, yaw,
 def test_classes_are_the_same_in_every_home():
     known = class_of_category()
     assert sorted(known, key=known.__getitem__) == sorted(known)
-    assert min(known.values()) == 4 and max(known.values()) < PARTICLES[0]
+    assert min(known.values()) == 4 and max(known.values()) < SLOTS[0]
 
 
 def test_mistakes_are_typed(world):

@@ -203,10 +203,10 @@ def _first_of(pieces: FallPieces, frame: Frames, ways: Ways) -> FirstMet:
         # the search for the place of the least is one number at a time
         found = jnp.min(jnp.where(depth <= least[..., None], owner, NONE), axis=-1)
     elif pieces.slabs is None or pieces.body is None or pieces.slabs.shape[1] > FEW:
-        (least,), (found,) = _least_of_all([_depths(pieces, frame, ways)], owner)
+        (least,), (found,) = least_of_all([_depths(pieces, frame, ways)], owner)
     else:  # what is computed of the pieces serves all points
         of_points = [_depths(pieces, frame, _point(ways, k))[:, 0] for k in range(ways.active.shape[1])]
-        least, found = (jnp.stack(x, axis=-1) for x in _least_of_all(of_points, owner))
+        least, found = (jnp.stack(x, axis=-1) for x in least_of_all(of_points, owner))
     return FirstMet(jnp.where(jnp.isfinite(least), found, -1), least)
 
 
@@ -224,7 +224,7 @@ def _point(ways: Ways, k: int) -> Ways:
     )
 
 
-def _least_of_all(
+def least_of_all(
     depths: Sequence[Float[jax.Array, "*b E"]], owner: Int[np.ndarray, "E"]
 ) -> tuple[Sequence[Float[jax.Array, "*b"]], Sequence[Int[jax.Array, "*b"]]]:
     """The least of each of some depths and its owner, the first of equals, in one reduction."""
@@ -285,12 +285,25 @@ def _into_many_slabs(slabs: Float[np.ndarray, "E A 5"], frame: Frames, ways: Way
     per = 1.0 / _steep(-dot([jnp.asarray(up)[..., None] for up in frame.up()], normal))
     half = jnp.abs(per) * slabs[..., 4]
     depth: AnyArray = np.full(1, np.inf, np.float32)
+    lows, highs = list[jax.Array](), list[jax.Array]()
     for line in range(len(ways.shift)):
         start = frame.local(frame.offset(ways.line(line)))
         middle = (slabs[..., 3] - dot([x[..., None] for x in start], normal)) * per
-        low, high = jnp.max(middle - half, axis=-1), jnp.min(middle + half, axis=-1)
-        depth = jnp.minimum(depth, _met(low, high, ways, line))
+        lows.append(jnp.asarray(middle - half))
+        highs.append(jnp.asarray(-middle - half))
+    ends = _greatest([*lows, *highs])
+    for line, (low, high) in enumerate(zip(ends[: len(lows)], ends[len(lows) :], strict=True)):
+        depth = jnp.minimum(depth, _met(low, -high, ways, line))
     return jnp.asarray(depth)
+
+
+def _greatest(values: Sequence[Float[jax.Array, "*b A"]]) -> Sequence[Float[jax.Array, "*b"]]:
+    """The greatest of each array along its last axis, in one reduction."""
+
+    def greater(one: tuple, other: tuple) -> tuple:
+        return tuple(jnp.maximum(a, b) for a, b in zip(one, other, strict=True))
+
+    return jax.lax.reduce(tuple(values), tuple([np.float32(-np.inf)] * len(values)), greater, (values[0].ndim - 1,))
 
 
 def _into_round(pieces: FallPieces, frame: Frames, ways: Ways) -> Float[jax.Array, "W K E"]:

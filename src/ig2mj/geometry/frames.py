@@ -6,7 +6,9 @@ them; three arrays do not.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+import operator
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax
@@ -68,6 +70,35 @@ class Frames(NamedTuple):
 def numbers(vectors: AnyArray) -> list[AnyArray]:
     """The numbers of vectors [..., 3]."""
     return [vectors[..., i] for i in range(vectors.shape[-1])]
+
+
+def total(values: AnyArray, axis: int = -1) -> jax.Array:
+    """The sum over a short axis, number by number: it becomes part of the kernel that uses it, where a reduction is one
+    of its own."""
+    return _combined(operator.add, values, axis)
+
+
+def some(values: AnyArray, axis: int = -1) -> jax.Array:
+    """Whether any is true along a short axis; see `total`."""
+    return _combined(operator.or_, values, axis)
+
+
+def _combined(operation: Callable[[jax.Array, jax.Array], jax.Array], values: AnyArray, axis: int) -> jax.Array:
+    array = jnp.asarray(values)
+    if not array.shape[axis]:
+        return jnp.sum(array, axis=axis, dtype=array.dtype)
+    parts = [jax.lax.index_in_dim(array, i, axis, keepdims=False) for i in range(array.shape[axis])]
+    return functools.reduce(operation, parts)
+
+
+def sums(values: Numbers, axis: int) -> Sequence[jax.Array]:
+    """The sums of arrays of one shape over an axis, in one reduction."""
+
+    def added(one: tuple, other: tuple) -> tuple:
+        return tuple(a + b for a, b in zip(one, other, strict=True))
+
+    operands = tuple(jnp.asarray(v) for v in values)
+    return jax.lax.reduce(operands, tuple(np.zeros((), v.dtype) for v in operands), added, (axis % operands[0].ndim,))
 
 
 def dot(one: Numbers, other: Numbers) -> AnyArray:

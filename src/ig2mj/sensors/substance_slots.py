@@ -51,7 +51,7 @@ SPOT_LEAST, SPOT_MOST = 0.006, 0.12
 FIRES, TONGUES = 4, 14
 """Objects on fire that are shown, and tongues of each."""
 
-FLAME_HEIGHT, FLAME_RADIUS = 0.2, 0.045
+FLAME_HEIGHT, FLAME_RADIUS = 0.2, 0.032
 """m to which tongues rise, and half the width of one at the bottom."""
 
 ELLIPSOID, BOX = mujoco.mjtGeom.mjGEOM_ELLIPSOID, mujoco.mjtGeom.mjGEOM_BOX

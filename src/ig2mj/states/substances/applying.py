@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
-from ig2mj.geometry.frames import Frames, numbers
+from ig2mj.geometry.frames import Frames, numbers, some
 from ig2mj.geometry.poses import quat_rotate
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep
@@ -73,16 +73,20 @@ def sprays(model: StateModel) -> Int[np.ndarray, "P"]:
 
 def dipped(step: EventStep) -> Bool[Array, "W A C"]:
     """Which object that can absorb is in which container."""
+    return jnp.any(_points_in(step), axis=-1)
+
+
+def _points_in(step: EventStep) -> Bool[Array, "W A C N"]:
+    """Which points of objects that can absorb are in which container, but for those of the container itself."""
     found, view = of(step.model), step.view
     rows, containers = found.row[absorbers(step.model)], found.containers
     points = Frames.of(view.body_pos, view.body_quat, found.body[rows]).points(numbers(found.pos[rows]))  # [W, A, N]
     frames = containers.frames(view).with_axes(1, 3)  # [W, 1, C, 1]
     local = frames.local(frames.offset([x[:, :, None] for x in points]))
-    within = jnp.ones((1, 1, 1, 1), bool)  # [W, A, C, N]
+    within: Array = (containers.object != absorbers(step.model)[:, None])[None, :, :, None]
     for x, low, high in zip(local, numbers(found.things.low), numbers(found.things.high), strict=True):
-        within &= (x >= low[:, None]) & (x <= high[:, None])
-    there = jnp.any(within, axis=-1)
-    return there & (containers.object != absorbers(step.model)[:, None])
+        within = within & (x >= low[:, None]) & (x <= high[:, None])
+    return jnp.asarray(within)
 
 
 class Applied(NamedTuple):
@@ -139,13 +143,14 @@ def _loaded(step: EventStep) -> Bool[Array, "W B U"]:
     return touches[..., None] & (coat.absorbed_drops(model, step.states, brushes) >= 1.0 / POINTS_PER_DROP)
 
 
-def may_act(step: EventStep, there: Bool[Array, "W A C"]) -> Bool[Array, ""]:
-    """False: nothing is applied. It costs less than `applied`. `there`: from `dipped`."""
+def may_act(step: EventStep) -> Bool[Array, ""]:
+    """False: nothing is applied. It costs less than `applied`."""
     found, states = of(step.model), step.states
     acts = jnp.any(_loaded(step))
-    if there.size:
+    if len(absorbers(step.model)) and len(found.containers.object):
         has = (jnp.asarray(states.volume) >= CONTAINS) & ~states.solid
-        acts |= jnp.any(there[..., None] & has[:, None] & (_lacking(step) > 0.0)[:, :, None])
+        takes = some(has[:, None] & (_lacking(step) > 0.0)[:, :, None])  # [W, A, C]
+        acts |= jnp.any(_points_in(step) & takes[..., None])
     rows = sprays(step.model)
     if len(rows):
         acts |= jnp.any(jnp.asarray(states.toggled_on)[:, found.containers.object[rows]])

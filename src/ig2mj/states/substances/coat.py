@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.frames import Frames, dot, numbers
+from ig2mj.geometry.frames import Frames, dot, numbers, some, total
 from ig2mj.geometry.poses import matrix_rows, quat_rotate
 from ig2mj.states.branches import changed_where
 from ig2mj.states.definitions import cleaning, wetness
@@ -126,14 +126,15 @@ def spilled(
     wet = jnp.asarray(states.wetness)
     if found.water >= 0:
         mine = (met[..., None] == np.arange(len(soakable))) & soakable  # [W, K, O]
-        water = jnp.sum(jnp.where(mine, soaking[..., found.water, None], 0.0), axis=1)  # [W, O]
+        water = total(jnp.where(mine, soaking[..., found.water, None], 0.0), axis=1)  # [W, O]
         soaked = wet + water if model.paper else jnp.maximum(wet, np.where(soakable, p.wetness_soaked, 0.0))
         wet = jnp.where(water > 0, soaked, wet)
     own = np.arange(len(found.names)) != found.water
     absorbs = (met[..., None] == found.covered) & soakable[found.covered]  # [W, K, D]
-    drops = jnp.sum(jnp.where(absorbs[..., None] & own, soaking[:, :, None], 0.0), axis=1)  # [W, D, U]
-    takes = np.append(~p.has("waterSink") & ~soakable, False)  # the last: no object
-    row = jnp.where(jnp.asarray(takes)[met], jnp.asarray(found.row)[met], len(found.covered))  # [W, K]
+    drops = total(jnp.where(absorbs[..., None] & own, soaking[:, :, None], 0.0), axis=1)  # [W, D, U]
+    takes = ~p.has("waterSink") & ~soakable
+    rows = np.append(np.where(takes, found.row, len(found.covered)), len(found.covered))  # the last: of no object
+    row = jnp.asarray(rows)[met]  # [W, K]
     coat = jnp.asarray(states.coat)
     for k in range(amounts.shape[1]):
         onto = (row[:, k, None] == np.arange(len(found.covered)))[..., None] & (amounts[:, k] > 0)[:, None]
@@ -165,7 +166,7 @@ def can_remove(step: EventStep) -> Bool[Array, "W T U"]:
     model, states = step.model, step.states
     found, tools = of(model), model.parameters.tool_object
     full = saturated(model, states, tools)
-    by = jnp.any(full[:, :, None] & found.cleaners, axis=-1)
+    by = some(full[:, :, None] & found.cleaners)
     soaked = wetness.soaked(model, states.wetness)[:, tools]
     able = by | found.dry | (found.wet & soaked[..., None])
     return able & cleaning.working(model, states.toggled_on)[..., None]

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.frames import Frames, Numbers, dot, numbers
+from ig2mj.geometry.frames import Frames, Numbers, dot, numbers, sums
 from ig2mj.scene.manifest import InsideEntry
 from ig2mj.scene.tables import SceneTables
 
@@ -135,8 +135,8 @@ class Openings(NamedTuple):
         """The lowest place of each rim: the mean of its lowest corners, of an edge its middle."""
         height = self.rim[2]
         weight = jnp.maximum(LOWEST - (height - jnp.min(height, axis=-1, keepdims=True)), 0.0)
-        total = jnp.sum(weight, axis=-1)
-        return [jnp.sum(weight * n, axis=-1) / total for n in self.rim]
+        *weighted, weights = sums([*(weight * n for n in self.rim), weight], axis=-1)
+        return [w / weights for w in weighted]
 
     def outwards(self) -> Numbers:
         """Horizontal unit vectors in which the openings point; of one that points up or down, to its lowest place."""

@@ -21,6 +21,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
+from ig2mj.geometry.frames import some, total
 from ig2mj.knowledge.transitions import MIXERS, STIRRERS, Transition
 from ig2mj.scene.tables import SceneTables
 from ig2mj.states.definitions import sliced
@@ -174,17 +175,22 @@ def update(step: EventStep) -> EventStep:
     now = _now(step, table)
     volume = jnp.asarray(step.states.volume)
     if volume.shape[1] and len(table.rules):
-        taken = jnp.any(now.first[..., None] & table.inputs, axis=2)  # [W, C, U]
-        made = jnp.any(now.first[..., None] & table.output, axis=2)
-        becomes = jnp.any(made, axis=-1, keepdims=True)
+        rule = jnp.min(jnp.where(now.first, np.arange(len(table.rules)), len(table.rules)), axis=-1)  # [W, C]
+        taken, made = _of_rule(table.inputs, rule), _of_rule(table.output, rule)  # [W, C, U]
+        becomes = some(made)[..., None]
         litres = jnp.sum(jnp.where(now.taken, own.litres, 0.0), axis=-1, keepdims=True)
-        amount = jnp.sum(jnp.where(taken, volume, 0.0), axis=-1, keepdims=True)
+        amount = total(jnp.where(taken, volume, 0.0))[..., None]
         step = step.having(
             volume=jnp.where(taken, 0.0, volume) + jnp.where(made, amount + litres, 0.0),
             drawn=step.states.drawn + jnp.sum(jnp.where(made, litres, 0.0), axis=1),
             lost=step.states.lost + jnp.sum(jnp.where(taken & ~becomes, volume, 0.0), axis=1),
         )
     return _objects_changed(step, now) if len(own.object) else step
+
+
+def _of_rule(of_rules: Bool[np.ndarray, "Q U"], rule: Int[Array, "W C"]) -> Bool[Array, "W C U"]:
+    """The rows of a table of rules; of no rule, whose number is `Q`, none."""
+    return jnp.asarray(np.concatenate([of_rules, np.zeros_like(of_rules[:1])]))[rule]
 
 
 def _objects_changed(step: EventStep, now: _Now) -> EventStep:

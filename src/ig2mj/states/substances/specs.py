@@ -25,14 +25,14 @@ def _cleaned(step: EventStep) -> EventStep:
     applies = applying.exist(model)
     if not applies and not washing.has_machines(model):
         return coat.wipe(step)
-    there = applying.dipped(step) if applies else None
     acts = ~(coat.wipes_nothing(step) & washing.rests(step))
-    if there is not None:
-        acts |= applying.may_act(step, there)
+    if applies:
+        acts |= applying.may_act(step)
 
     def act(fields: tuple[list[Array], list[Array]]) -> tuple[list[Array], list[Array]]:
         now = _having(step, fields)
-        now = now if there is None else applying.update(now, applying.applied(now, there))
+        if applies:
+            now = applying.update(now, applying.applied(now, applying.dipped(now)))
         return _changing(washing.update(coat.wipe(now)).states)
 
     return _having(step, changed_where(acts, act, _changing(step.states)))

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.first_fall import FallPieces, Ways, first_met
+from ig2mj.geometry.first_fall import FallPieces, Ways, first_met, least_of_all
 from ig2mj.geometry.frames import Numbers, dot, numbers
 from ig2mj.scene.tables import SceneTables
 from ig2mj.states.substances.containers import Containers
@@ -82,11 +82,11 @@ def land(tables: SceneTables, containers: Containers, falling: Falling, view: Ph
     ways = Ways(falling.active, falling.start, falling.aside, falling.origin, ASIDE, DEPTHS)
     solid = first_met(FallPieces.of(tables), view.body_pos, view.body_quat, ways)
     opening = _openings_met(containers, falling, ways, view)  # [W, K, C]
-    first_opening = jnp.min(opening, axis=-1, initial=jnp.inf)
+    own = np.arange(opening.shape[-1], dtype=np.int32)
+    (first_opening,), (entered,) = least_of_all([jnp.asarray(opening)], own)
     enters = falling.active & jnp.isfinite(first_opening) & (first_opening <= solid.depth + SLACK)
     meets = falling.active & ~enters & (solid.object >= 0)
-    own = np.arange(opening.shape[-1])
-    into = enters[..., None] & (jnp.argmin(opening, axis=-1)[..., None] == own) if len(own) else falling.source
+    into = enters[..., None] & (entered[..., None] == own)
     depth = jnp.where(meets, solid.depth, 0.0)
     out = sum(jnp.where(depth >= d, more, 0.0) for d, more in zip(DEPTHS[1:-1], np.diff(ASIDE), strict=True)) + ASIDE[0]
     place = [*(falling.start[i] + out * falling.aside[i] for i in range(2)), falling.start[2] - depth]

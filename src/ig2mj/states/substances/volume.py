@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt32
+from jaxtyping import Bool, Float, UInt32
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.frames import Numbers, numbers
+from ig2mj.geometry.frames import Numbers, numbers, some, sums, total
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep, Saved, StateSpec, nothing_inherited
 from ig2mj.states.substances import coat
@@ -83,8 +83,8 @@ def outflow(model: StateModel, states: ExtendedStates, volume: Float[Array, "W C
     """
     dt = model.options.timestep
     free = jnp.where(states.solid, 0.0, volume)
-    available = jnp.sum(free, axis=-1)
-    excess = jnp.sum(volume, axis=-1) - stand.holds
+    available = total(free)
+    excess = total(volume) - stand.holds
     wanted = jnp.maximum(excess * (dt / OUTFLOW_TIME), jnp.minimum(excess, LEAST_OUTFLOW))
     leaving = jnp.clip(wanted, 0.0, available)
     share = free / jnp.maximum(available, 1e-12)[..., None]
@@ -115,9 +115,9 @@ def drained(model: StateModel, volume: Float[Array, "W C U"]) -> Float[Array, "W
     drains = of(model).containers.drains
     if not drains.any():
         return jnp.zeros_like(volume)
-    total = jnp.sum(volume, axis=-1)
-    leaving = jnp.minimum(total, DRAIN_RATE * model.options.timestep) * drains
-    return jnp.minimum(volume / jnp.maximum(total, 1e-12)[..., None] * leaving[..., None], volume)
+    litres = total(volume)
+    leaving = jnp.minimum(litres, DRAIN_RATE * model.options.timestep) * drains
+    return jnp.minimum(volume / jnp.maximum(litres, 1e-12)[..., None] * leaving[..., None], volume)
 
 
 class Outlets(NamedTuple):
@@ -157,7 +157,7 @@ def outlets(model: StateModel, states: ExtendedStates, stand: Standing) -> Outle
     gone = drained(model, states.volume)
     volume = states.volume - gone
     flow, from_taps = outflow(model, states, volume, stand), taps(model, states.toggled_on)
-    flowing = jnp.concatenate([jnp.any(sum(flow) > 0, axis=-1), jnp.any(from_taps > 0, axis=-1)], axis=1)  # [W, E]
+    flowing = jnp.concatenate([total(flow.left + flow.given) > 0, total(from_taps) > 0], axis=1)  # [W, E]
     before = np.tri(flowing.shape[1], k=-1, dtype=bool)
     turn = jnp.sum(flowing[:, None] & before, axis=-1)
     chosen = flowing[:, None] & (turn[:, None] == np.arange(MOST)[:, None])
@@ -168,21 +168,21 @@ def poured(step: EventStep, out: Outlets, ends: Streams) -> EventStep:
     """The step after contents flowed where their streams end. `ends`: of the chosen outlets."""
     model, states = step.model, step.states
     count = len(of(model).containers.body)
-    flows = jnp.any(out.chosen, axis=1)[..., None]
+    flows = some(out.chosen, axis=1)[..., None]
     left, given = (jnp.where(flows[:, :count], x, 0.0) for x in out.flow)
     from_taps = jnp.where(flows[:, count:], out.from_taps, 0.0)
-    parts = (out.chosen[:, :, :count], left + given), (out.chosen[:, :, count:], from_taps)
-    one, other = (jnp.sum(jnp.where(own[..., None], x[:, None], 0.0), axis=2) for own, x in parts)
-    amounts = one + other  # [W, K, U]
-    into = jnp.sum(jnp.where(ends.landed.container[..., None], amounts[:, :, None], 0.0), axis=1)
+    of_containers = jnp.where(out.chosen[:, :, :count, None], (left + given)[:, None], 0.0)
+    of_taps = jnp.where(out.chosen[:, :, count:, None], from_taps[:, None], 0.0)
+    amounts = jnp.sum(of_containers, axis=2) + total(of_taps, axis=2)  # [W, K, U]
+    into = total(jnp.where(ends.landed.container[..., None], amounts[:, :, None], 0.0), axis=1)
     outside = jnp.where(jnp.any(ends.landed.container, axis=-1)[..., None], 0.0, amounts)
     states = dataclasses.replace(
         states,
         volume=jnp.maximum(out.volume - left, 0.0) + into,
-        lost=states.lost + jnp.sum(out.gone, axis=1) + jnp.sum(outside, axis=1),
-        drawn=states.drawn + jnp.sum(given, axis=1) + jnp.sum(from_taps, axis=1),
+        lost=states.lost + jnp.sum(out.gone, axis=1) + total(outside, axis=1),
+        drawn=states.drawn + jnp.sum(given, axis=1) + total(from_taps, axis=1),
     )
-    by_taps = jnp.any(out.chosen[:, :, count:], axis=-1)  # their drops soak (`ig2mj.states.definitions.water`)
+    by_taps = some(out.chosen[:, :, count:])  # their drops soak (`ig2mj.states.definitions.water`)
     states = coat.spilled(model, states, outside, ends.landed.object, ends.points, by_taps)
     return dataclasses.replace(step, states=states)
 
@@ -198,13 +198,18 @@ def streams(model: StateModel, view: PhysicsView, chosen: Bool[Array, "W K E"]) 
     worlds, most = chosen.shape[:2]
 
     def follow() -> Streams:
-        count = len(containers.body)
         openings, taps = containers.openings(view), numbers(jnp.asarray(view.link_pos)[:, _tap_links(model)])
-        of_containers, of_taps = chosen[:, :, :count], chosen[:, :, count:]
-        begins = zip(openings.lowest(), taps, strict=True)
-        start = [_of_chosen(of_containers, rim) + _of_chosen(of_taps, tap) for rim, tap in begins]
-        aside = [_of_chosen(of_containers, n) for n in openings.outwards()]
-        falling = Falling(jnp.any(chosen, axis=-1), start, aside, of_containers, _origins(model, chosen))
+        straight = jnp.zeros(taps[0].shape)
+        begins = [jnp.concatenate(x, axis=1) for x in zip(openings.lowest(), taps, strict=True)]
+        outwards = [jnp.concatenate([n, straight], axis=1) for n in openings.outwards()]
+        owner = np.concatenate([containers.object, np.full(len(_tap_links(model)), -1)])  # a tap's own basin takes it
+        found = sums(
+            [jnp.where(chosen, x[:, None], 0.0) for x in (*begins, *outwards)]
+            + [jnp.where(chosen, x, 0).astype(jnp.int32) for x in (1, 1 + owner)],
+            axis=2,
+        )
+        start, aside, active, origin = list(found[:3]), list(found[3:5]), found[5] > 0, found[6] - 1
+        falling = Falling(active, start, aside, chosen[:, :, : len(containers.body)], origin)
         landed = land(model.tables, containers, falling, view)
         return Streams(start, landed, coat.points_near(model, landed, view))
 
@@ -217,26 +222,15 @@ def streams(model: StateModel, view: PhysicsView, chosen: Bool[Array, "W K E"]) 
     return jax.lax.cond(jnp.any(chosen), follow, none)
 
 
-def _of_chosen(chosen: Bool[Array, "W K E"], of_outlets: Float[Array, "W E"]) -> Float[Array, "W K"]:
-    """A number of the outlet of each stream; 0 where it has none of these."""
-    return jnp.sum(jnp.where(chosen, of_outlets[:, None], 0.0), axis=2)
-
-
 def _tap_links(model: StateModel) -> np.ndarray:
     return model.parameters.water_link if of(model).water >= 0 else np.zeros(0, int)
-
-
-def _origins(model: StateModel, chosen: Bool[Array, "W K E"]) -> Int[Array, "W K"]:
-    """The object that each stream comes from; -1 of a tap, since its own basin takes it."""
-    owner = np.concatenate([of(model).containers.object, np.full(len(_tap_links(model)), -1)])
-    return jnp.max(jnp.where(chosen, owner, -1), axis=2, initial=-1)
 
 
 def idle(step: EventStep) -> Bool[Array, ""]:
     """Nothing flows, and nothing drains."""
     model, states = step.model, step.states
     flow = outflow(model, states, states.volume, standing(model, step.view))
-    moving = jnp.any(sum(flow) > 0) | jnp.any(drained(model, states.volume) > 0)
+    moving = jnp.any(flow.left + flow.given + drained(model, states.volume) > 0)
     return ~moving & ~jnp.any(taps(model, states.toggled_on) > 0)
 
 
