@@ -11,6 +11,7 @@ from ig2mj.cli import call
 from ig2mj.errors import UnknownNameError
 from ig2mj.planning import Domain, PlanningError, SymbolicRung, TaskPlanner, make_step, solve, summary
 from ig2mj.planning.pddl import domain_pddl, problem_pddl
+from ig2mj.planning.step_order import ordered
 from ig2mj.planning.steps import PRIMITIVES
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.predicates.host_queries import HostQueries
@@ -236,3 +237,15 @@ def test_large_things_are_put_into_a_container_before_small_ones(sampler, start)
     placed = [s.split()[1] for s in steps if s.startswith("place_inside")]
     volumes = [Domain(sampler.model).volume(name) for name in placed]
     assert len(placed) == 3 and volumes == sorted(volumes, reverse=True)
+
+
+def test_what_was_taken_for_a_condition_is_first_put_where_that_becomes_true(model):
+    floor, beside = read_conditions(["(on_floor book kitchen_0)", "(next_to book box)"])
+    domain = Domain(model, 2)
+
+    def first(held, begun):
+        return ordered([floor, beside], {}, held, lambda c: "", domain, begun)[0]
+
+    assert first(["book"], beside) == beside
+    assert first(["book"], None) == floor
+    assert first([], beside) == floor

@@ -163,7 +163,7 @@ def plan_strokes(
     world: PlannedWorld, name: str, tool: str, hand: int, spots: Sequence[DirtSpot], visited: Sequence[Stance]
 ) -> StrokePlan | None:
     """The stance from which most particles are in reach, of those near the nearest ones that were not visited."""
-    floor, obstacles = world.floor(), world.obstacles([tool])
+    floor, obstacles = world.floor(), world.obstacles([tool], stays=False)
     spots = [s for s in spots if s.normal[2] > LOWEST]
     away = world.away(world.spheres(*world.hand_axes(hand), holding=tool, hand=hand))
     held, loose = HeldTool(world, tool, hand), not world.domain.fixed(name)
@@ -194,7 +194,7 @@ class _From:
         """`obstacles`: all but the tool. loose: what is cleaned can move."""
         self._loose = loose
         self._held, self._world, self._hand, self._stance = held, held.world, held.hand, stance
-        self._obstacles = obstacles.about(stance.xy, *held.world.body.trunk)
+        self._obstacles = held.world.standing(obstacles, stance, held.hand)
         self._start = held.world.carried(held.hand, stance)
         self._known: dict[tuple[float, ...], list[tuple[Region, np.ndarray]]] = {}
 

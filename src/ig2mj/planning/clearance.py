@@ -119,6 +119,7 @@ class Obstacles:
         self.objects, self._bodies = scene.tables.piece_object, scene.tables.piece_body
         self._keep = (self.objects >= 0) & ~np.isin(self.objects, list(without))
         self._body: tuple[float, ...] | None = None
+        self._carried = np.zeros((0, 4))
         self._normal, self._offset, self._low, self._high = placed.normal, placed.offset, placed.low, placed.high
 
     def distance(self, points: Float[np.ndarray, "*M 3"]) -> Float[np.ndarray, "*M"]:
@@ -136,6 +137,12 @@ class Obstacles:
         of it, which are spheres smaller than `HELD`: its hands pass through it."""
         other = copy.copy(self)
         other._body = (*(float(v) for v in axis), radius, height)
+        return other
+
+    def beside(self, carried: Float[np.ndarray, "n 4"]) -> Obstacles:
+        """The same with spheres (x, y, z, radius; m) of what a robot's other hands hold."""
+        other = copy.copy(self)
+        other._carried = carried
         return other
 
     def clear(self, spheres: Float[np.ndarray, "M 4"]) -> bool:
@@ -166,6 +173,9 @@ class Obstacles:
             x, y, wide, high = self._body
             held = (radius < HELD) & (centre[:, 2] < high)
             bad |= held & (np.hypot(centre[:, 0] - x, centre[:, 1] - y) < wide + radius)
+        if len(self._carried):
+            apart = np.linalg.norm(centre[:, None] - self._carried[:, :3], axis=-1)
+            bad |= (apart < radius[:, None] + self._carried[:, 3]).any(1)
         wide = radius[:, None]
         low, high = (centre - wide).min(0), (centre + wide).max(0)
         near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))

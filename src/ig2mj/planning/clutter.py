@@ -1,4 +1,5 @@
-"""Things that lie in a robot's way to what a step is about: found by the search for a way, and put elsewhere."""
+"""Things that are in a robot's way to what a step is about: found by the search for a way, and put elsewhere, or pushed
+aside where hands do not take hold of them."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from ig2mj.planning.footprint import LOWEST
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor, Point
 from ig2mj.planning.moves import PrimitiveFailed, Program
 from ig2mj.planning.placing import bring_out
+from ig2mj.planning.pushing import push_aside
 from ig2mj.planning.stances import behind_wall
 from ig2mj.planning.steps import Step
 from ig2mj.planning.world import PlannedWorld
@@ -20,30 +22,46 @@ from ig2mj.planning.world import PlannedWorld
 LOOKED_AT = 60
 """Places near what a step is about from which it is looked whether a wall is in between, about."""
 
+GAIN = 0.25
+"""m by which floor has to be nearer to what a step is about than floor in reach, for things to be moved out of the way
+there."""
+
 NEAR_WAY, HIGH = 0.3, 1.05
 """m from a way within which a thing is in it, and height from which on it is above it."""
 
 
 def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, str, bool]:
-    """Puts the first thing that is in the way elsewhere on the floor; returns whether there was one, and it was."""
+    """Puts the first thing that is in the way elsewhere on the floor, or pushes it aside; returns whether there was
+    one, and it was."""
     if all(world.held) or not isinstance(world.body, HandedBody):
         return False
     name = clutter_in_the_way(world, step)
     if name is None:
         return False
     try:
-        return (yield from bring_out(world, name)).done
+        if world.domain.graspable(name):
+            return (yield from bring_out(world, name)).done
+        point = target_of(world, step)
+        assert point is not None  # else nothing was in the way
+        others, reach = [n for n in _loose(world, step) if n != name], _nearer(world, point)
+        opens = lambda floor: nearest_floor(world, floor, point, reach) is not None  # noqa: E731
+        return (yield from push_aside(world, name, opens, others))
     except PrimitiveFailed:
         return False
 
 
+def _loose(world: PlannedWorld, step: Step) -> list[str]:
+    """Things that may be moved out of the way for a step."""
+    return [n for n in world.domain.loose if n not in step.arguments and n not in world.held]
+
+
 def clutter_in_the_way(world: PlannedWorld, step: Step) -> str | None:
-    """The first thing that hands can take on the way to what a step is about, without loose things; None: the robot
-    comes there, or does not without them."""
-    point, reach = target_of(world, step), world.body.reach
-    if point is None or nearest_floor(world, world.floor(), point, reach) is not None:
+    """The first thing on the way to what a step is about, without loose things; None: the robot comes as near to that
+    with them as without."""
+    point = target_of(world, step)
+    if point is None or (reach := _nearer(world, point)) <= 0.0:
         return None
-    loose = [n for n in world.domain.loose if n not in step.arguments and n not in world.held]
+    loose = _loose(world, step)
     freed = world.floor(without=[world.index(n) for n in loose])
     goal, (here, _) = nearest_floor(world, freed, point, reach), world.base
     way = None if goal is None else freed.way(here, goal)
@@ -54,12 +72,26 @@ def clutter_in_the_way(world: PlannedWorld, step: Step) -> str | None:
     met = list[tuple[int, str]]()
     for name in loose:
         low, high = world.facts.box(name)
-        if not world.domain.graspable(name) or low[2] > HIGH or high[2] < LOWEST:
+        if low[2] > HIGH or high[2] < LOWEST:
             continue
         near = np.linalg.norm(points - np.clip(points, low[:2], high[:2]), axis=1) < NEAR_WAY
         if near.any():
             met.append((int(np.argmax(near)), name))
     return min(met)[1] if met else None
+
+
+def _nearer(world: PlannedWorld, point: Float[np.ndarray, "3"]) -> float:
+    """m from a point within which there is floor that is better than all to which the robot can drive."""
+    floor, (here, _) = world.floor(), world.base
+    reach = world.body.reach + float(np.linalg.norm(world.body.shoulders[:, :2], axis=1).max())
+    cells = floor.within(point[:2], reach)
+    cells = cells[np.isfinite(floor.distances(here, NEAR_START)[tuple(cells.T)])]
+    middles, obstacles = floor.occupancy.middles(cells), world.obstacles()
+    apart = np.linalg.norm(middles - point[:2], axis=1)
+    for k in np.argsort(apart)[:: max(1, len(apart) // LOOKED_AT)]:
+        if not behind_wall(world, obstacles, middles[k], point):
+            return float(apart[k]) - GAIN
+    return reach
 
 
 def nearest_floor(world: PlannedWorld, floor: FreeFloor, point: Float[np.ndarray, "3"], reach: float) -> Point | None:

@@ -69,6 +69,10 @@ POSES, WAYS = 6, 120
 LOWER = 0.04
 """m between the heights at which what is let go has to have room."""
 
+LAST_AIMS, AIMS_APART = 16, 0.025
+"""Points of an object that stances are looked for where there are none for its middle and its ends, and m between
+them."""
+
 NEAREST = 200
 """Cells of the floor that are compared to find the edge of an object that is nearest to it."""
 
@@ -132,7 +136,15 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     lift = LIFT * UP * float(pose.palm @ UP > -0.9)
     deep, floats = vector3(pose.at(-BELOW)), world.body.opening is None
     thin = floats and float(np.ptp(world.vertices(name) @ pose.palm)) < THIN
-    near = Phase(hand=hand, pos=vector3(pose.at(NEAR)), quat=quat, tolerance=0.01, limit=12, after="", speed=COMING)
+    near = Phase(
+        hand=hand,
+        pos=vector3(pose.at(min(NEAR, pose.before))),
+        quat=quat,
+        tolerance=0.01,
+        limit=12,
+        after="",
+        speed=COMING,
+    )
     reason = yield [
         *travel(hand, way, quat),
         *([near] if thin else []),
@@ -174,15 +186,21 @@ def _plan(
     world: PlannedWorld, name: str, hand: int, tried: Sequence[GraspPose], prefers: Prefers | None = None
 ) -> tuple[Stance, GraspPose] | None:
     """A stance and a pose from which the hand has a way, the most comfortable first; later attempts take others."""
-    obstacles, floor = world.obstacles([name]), world.floor()
+    obstacles, floor = world.obstacles([name], stays=False), world.floor()
     poses = [p for p in grasp_poses(world, name, obstacles) if not any(_alike(p, t) for t in tried)]
     if not poses:
         return None
     points, on_arm = np.array([p.point for p in poses]), world.body.opening is not None
 
     def candidates() -> Iterator[tuple[Stance, GraspPose]]:
-        for point in (world.com(name), *points[_spread(points, world.com(name))], _nearest(world, floor, points)):
+        aims = [world.com(name), *points[_spread(points, world.com(name))], _nearest(world, floor, points)]
+        hardly = points[_apart(points)]
+        found = False
+        for k, point in enumerate((*aims, *hardly)):
+            if k >= len(aims) and found:
+                break
             for stance in stances(world, hand, point, floor, AWAY):
+                found = True
                 best = ordered(poses, stance.yaw, on_arm)
                 if prefers is not None:
                     best.sort(key=_less_wanted(prefers))
@@ -193,8 +211,8 @@ def _plan(
         stance, pose = candidate
         spheres, goal, back = world.spheres(pose.fingers, pose.palm), pose.at(pose.before), entries(pose, stance.xy)
         follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles, stance)
-        rests = world.resting(hand, stance)
-        return hand_path(obstacles, spheres, rests, goal, back, search=search, follows=follows) is not None
+        rests, standing = world.resting(hand, stance), world.standing(obstacles, stance, hand)
+        return hand_path(standing, spheres, rests, goal, back, search=search, follows=follows) is not None
 
     return first_way(candidates(), has_way, WAYS)
 
@@ -222,6 +240,15 @@ def _spread(points: np.ndarray, centre: Vector) -> list[int]:
             break
         if all(np.linalg.norm(points[k, :2] - points[f, :2]) > 0.25 for f in found):
             found.append(int(k))
+    return found
+
+
+def _apart(points: np.ndarray) -> list[int]:
+    """Points that are apart from each other, at most `LAST_AIMS`."""
+    found: list[int] = []
+    for k in range(len(points)):
+        if len(found) < LAST_AIMS and all(np.linalg.norm(points[k] - points[f]) > AIMS_APART for f in found):
+            found.append(k)
     return found
 
 

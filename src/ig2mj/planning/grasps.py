@@ -26,8 +26,12 @@ COMPASS = 8
 DEPTH = 0.06
 """m below an object's outermost point of a side that is still taken: not the bottom of a bowl."""
 
-BEFORE = (0.12, 0.06)
-"""m before a grasp from which on a hand comes straight to it, the best first."""
+BEFORE, FLAT = (0.12, 0.06), 0.02
+"""m before a grasp from which on a hand comes straight to it, the best first; that of a hand that floats where it has
+less room: it goes in between a thing and what is above it."""
+
+NARROW = 0.2
+"""Discomfort of a hand that comes straight to a grasp from nearer than it likes to."""
 
 AT_OBJECT = 0.4
 """Share of the spheres' radii that keeps clear of others where the hand takes hold: its parts are thinner."""
@@ -158,7 +162,7 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
         which, points = _between_fingers(own, points, fingers, palms, body.opening)
         fingers, palms = fingers[which], palms[which]
     before = np.where(_room(body, obstacles, points, fingers, palms, 0.0, AT_OBJECT), 0.0, -1.0)
-    for away in BEFORE:
+    for away in (*BEFORE, FLAT) if body.opening is None else BEFORE:
         still = np.flatnonzero(before == 0.0)
         before[still[_room(body, obstacles, points[still], fingers[still], palms[still], away, 1.0)]] = away
     lever = world.mass(name) * GRAVITY * np.linalg.norm((points - centre)[:, :2], axis=1)
@@ -237,7 +241,7 @@ def ordered(poses: Sequence[GraspPose], yaw: float, on_arm: bool = False) -> lis
     """The most comfortable first, for a robot that looks along `yaw`, rad. on_arm: its hand is on an arm."""
 
     def cost(pose: GraspPose) -> float:
-        narrow = 0.2 if pose.before < BEFORE[0] else 0.0
+        narrow = NARROW * (float(pose.before < BEFORE[0]) + float(pose.before < BEFORE[-1]))
         return pose.discomfort(yaw, on_arm) + narrow + BURDEN * pose.burden + SCRAPE * pose.scrapes
 
     return sorted(poses, key=cost)

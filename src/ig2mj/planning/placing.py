@@ -13,7 +13,7 @@ from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.clearance import HELD, Obstacles, straight
 from ig2mj.planning.driving import go
-from ig2mj.planning.grasping import grasp
+from ig2mj.planning.grasping import grasp, is_graspable
 from ig2mj.planning.moves import (
     ATTEMPTS,
     LET_GO,
@@ -22,6 +22,7 @@ from ig2mj.planning.moves import (
     RETREAT,
     UP,
     Primitive,
+    PrimitiveFailed,
     Program,
     ahead,
     first_way,
@@ -37,7 +38,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.opening import Tried, open_into
 from ig2mj.planning.phases import Phase, Until
-from ig2mj.planning.spots import Spot, grip_for, spots_for
+from ig2mj.planning.spots import Spot, grip_for, is_tipped, spots_for, spots_upon
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import PlannedWorld, Stance, Vector
@@ -76,7 +77,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
     def place(world: PlannedWorld, step: Step) -> Primitive:
         name, where = step.arguments
         hand_with(world, name)
-        turned_over = not turns_over
+        turned_over, righted = not turns_over, predicate != "inside"
         reason, detail, opened = "no_base", "", Tried()
         for attempt in range(ATTEMPTS):
             if name not in world.held:  # it fell, or was put where the relation is false
@@ -84,9 +85,13 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 if not again.done:
                     break
             hand = hand_with(world, name)
-            found, also = yield from _find(world, predicate, step, hand, opened)
+            found, also = yield from _find(world, predicate, step, hand, opened, until)
             if isinstance(found, str):
                 reason, detail = _lacking(found), f"{found} {predicate}({name}, {where}) would be true"
+                if found == _NO_SPOT and not righted:
+                    righted = True
+                    if (yield from _set_upright(world, where)):
+                        continue
                 if found == _NO_WAY and not turned_over and (yield from regrasp(world, name, hand)):
                     turned_over = True
                     continue
@@ -148,10 +153,11 @@ def _way(
 
 
 def _find(
-    world: PlannedWorld, predicate: str, step: Step, hand: int, opened: Tried
+    world: PlannedWorld, predicate: str, step: Step, hand: int, opened: Tried, until: str = ""
 ) -> Generator[Program, str, tuple[tuple[Stance, Spot] | str, tuple[Condition, ...]]]:
     """What `_plan` finds, and the further conditions that are true there: with those of the step, else without; what is
-    in the way of a container is opened before ways are searched for, and at last the object is let go as it hangs."""
+    in the way of a container is opened before ways are searched for, and at last the object is let go as it hangs. Of
+    what is only to touch something, `until` is that, places where it does not lie level are taken, too."""
     name, where = step.arguments
     while True:
         for also in dict.fromkeys((step.also, ())):
@@ -161,11 +167,24 @@ def _find(
                 return found, also
         if predicate != "inside" or not (yield from open_into(world, where, opened)) or name not in world.held:
             break
+    if isinstance(found, str) and until == "in_contact_with":
+        upon = _plan(world, predicate, name, hand, spots_upon(world, name, where), search=True)
+        found = found if isinstance(upon, str) else upon
     if found == _NO_WAY and name in world.held:
         found = _plan(world, predicate, name, hand, spots, search=True)
         if found == _NO_WAY and predicate in FALLS_OVER:
             found = _plan(world, predicate, name, hand, spots_for(world, predicate, name, where, hanging=True))
     return found, ()
+
+
+def _set_upright(world: PlannedWorld, where: str) -> Generator[Program, str, bool]:
+    """Puts a container that has fallen over onto open floor as it stands; returns whether it did."""
+    if world.domain.fixed(where) or where in world.held or all(world.held) or not is_tipped(world, where):
+        return False
+    try:
+        return is_graspable(world, where) and (yield from bring_out(world, where)).done
+    except PrimitiveFailed:
+        return False
 
 
 class _Remembered:
@@ -241,7 +260,7 @@ def _plan(
     Args:
       proposed: spots. search: ways are searched for where via points find none.
     """
-    obstacles, floor = world.obstacles([name]), world.floor()
+    obstacles, floor = world.obstacles([name], stays=False), world.floor()
     lacking, seen = _NO_SPOT, list[Stance]()
 
     def spots() -> Iterator[tuple[Spot, Vector, np.ndarray]]:
@@ -285,7 +304,7 @@ def _plan(
         stance, spot = candidate
         target, quat, rotation = grip_for(world, hand, name, spot)
         spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
-        back, standing = [UP, -ahead(stance.yaw)], obstacles.about(stance.xy, *world.body.trunk)
+        back, standing = [UP, -ahead(stance.yaw)], world.standing(obstacles, stance, hand)
         start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
         follows = world.follows(hand, quat, standing, stance)
         goal = target + (LET_GO + spot.drop) * UP

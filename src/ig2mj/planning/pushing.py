@@ -1,15 +1,17 @@
-"""Pushing: an object is brought into contact with another. What a hand can take is put onto it; what it cannot lift is
-pushed there over the floor or a table, by a palm on its far side."""
+"""Pushing: an object is brought into contact with another, or out of the way. What a hand can take is put onto the
+other; what it cannot lift is pushed over the floor or a table, by a palm on its far side."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 
 import numpy as np
 
 from ig2mj.planning.arm_orientations import points_ahead
+from ig2mj.planning.clearance import straight
 from ig2mj.planning.driving import go
+from ig2mj.planning.free_floor import FreeFloor
 from ig2mj.planning.grasping import grasp, is_graspable
 from ig2mj.planning.moves import (
     ATTEMPTS,
@@ -29,7 +31,7 @@ from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.placing import place
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
+from ig2mj.planning.world import AWAY, HELD_MARGIN, PlannedWorld, Stance, Vector
 
 ROUNDS, STROKE = 12, 0.4
 """Pushes of a primitive, and m of each, at most."""
@@ -45,6 +47,10 @@ SLOW = 0.02
 
 SIDES = (0.0, 0.5, -0.5)
 """rad by which a push may be off the straight line between both objects."""
+
+COMPASS, ASIDE, OFF_FLOOR = 16, (0.2, 0.4, 0.6, 0.9, 1.2), 0.03
+"""Directions in which something is pushed aside, m by which it is, and m above the floor from which on it has to have
+room there: it stands on carpets."""
 
 
 def push(world: PlannedWorld, step: Step) -> Primitive:
@@ -64,25 +70,107 @@ def push(world: PlannedWorld, step: Step) -> Primitive:
     for attempt in range(ROUNDS):
         if world.facts.holds("in_contact_with", name, other):
             return Outcome(attempts=attempt + 1)
-        hand, before = free_hand(world, failed), world.com(name)
-        found = _plan(world, name, other, hand, failed)
-        if found is None or failed >= ATTEMPTS:
+        pushed = yield from _push_once(world, name, _towards(world, name, other), failed)
+        if pushed is None or failed >= ATTEMPTS:
             break
-        stance, point, direction = found
-        if reason := (yield from go(world, stance)):
-            failed += 1
-            continue
-        plan = functools.partial(_program, world, name, other, hand, point, direction, failed)
-        program = yield from from_home(world, hand, plan)
-        if not program:
-            reason, detail, failed = "no_path", f"the hand has no path to {name}", failed + 1
-            continue
-        reason = yield program
-        failed += float(np.linalg.norm(world.com(name) - before)) < PRESS
-        detail = f"{name} does not reach {other}"
+        reason, moved = pushed
+        detail = f"the hand has no path to {name}" if reason == "no_path" else f"{name} does not reach {other}"
+        failed += moved < PRESS
     if world.facts.holds("in_contact_with", name, other):
         return Outcome(attempts=ROUNDS)
     return Outcome(reason or "not_true_after", detail, attempts=ROUNDS)
+
+
+def push_aside(
+    world: PlannedWorld, name: str, opens: Callable[[FreeFloor], bool], without: Sequence[str] = ()
+) -> Generator[Program, str, bool]:
+    """Pushes an object over the floor to where it bars no way, by as little as that takes; returns whether it bars none
+    then.
+
+    Args:
+      opens: whether a floor has the way. without: objects that do not count there.
+    """
+    failed, ignored = 0, [world.index(n) for n in without]
+    for _ in range(ROUNDS):
+        if opens(world.floor(without=ignored)):
+            return True
+        if failed == ATTEMPTS or not (ways := _ways_aside(world, name, opens, ignored)):
+            return False
+        pushed = yield from _push_once(world, name, ways, failed)
+        if pushed is None:
+            return False
+        failed += pushed[1] < PRESS
+    return opens(world.floor(without=ignored))
+
+
+def _ways_aside(
+    world: PlannedWorld, name: str, opens: Callable[[FreeFloor], bool], ignored: Sequence[int]
+) -> list[tuple[Vector, float]]:
+    """Directions, with how far, m, in which an object has room to be pushed to where it bars no way, the nearest
+    first."""
+    world.query.load(world.stage.snapshot(world.world))
+    borne = _borne(world, name)
+    index, (pos, quat), obstacles = world.index(name), world.pose(name), world.obstacles([name, *borne])
+    ignored = [*ignored, *(world.index(n) for n in borne)]
+    points = world.points(name) - pos
+    points = points[points[:, 2] > points[:, 2].min() + OFF_FLOOR]
+    spheres = np.column_stack([points, np.full(len(points), HELD_MARGIN)])
+    found = list[tuple[Vector, float]]()
+    for angle in np.arange(COMPASS) * (2 * np.pi / COMPASS):
+        way = np.array([np.cos(angle), np.sin(angle), 0.0])
+        for far in ASIDE:
+            if not straight(obstacles, spheres, pos, pos + far * way):
+                break
+            world.query.place(index, pos + far * way, quat)
+            if opens(world.floor(without=ignored, view=world.query.view)):
+                found.append((way, far))
+                break
+    return sorted(found, key=lambda pair: pair[1])
+
+
+def _borne(world: PlannedWorld, name: str) -> list[str]:
+    """Loose things that are on or in an object, and move with it."""
+    corners = world.vertices(name)
+    low, high, found = corners.min(0), corners.max(0), list[str]()
+    for other in world.domain.loose:
+        bottom = float(world.vertices(other)[:, 2].min())
+        over = (low[:2] <= world.com(other)[:2]).all() and (world.com(other)[:2] <= high[:2]).all()
+        if other != name and other not in world.held and over and low[2] + OFF_FLOOR < bottom < high[2] + OFF_FLOOR:
+            found.append(other)
+    return found
+
+
+def _push_once(
+    world: PlannedWorld, name: str, ways: Sequence[tuple[Vector, float]], failed: int
+) -> Generator[Program, str, tuple[str, float] | None]:
+    """One push: the reason why it failed, and m by which the object has moved; None: there is no floor to push it from.
+
+    Args:
+      ways: directions with how far it is to go. failed: pushes that moved nothing; others are tried.
+    """
+    hand, before = free_hand(world, failed), world.com(name)
+    found = _plan(world, name, ways, hand, failed)
+    if found is None:
+        return None
+    stance, point, way, gap = found
+    if reason := (yield from go(world, stance)):
+        return reason, 0.0
+    program = yield from from_home(world, hand, functools.partial(_program, world, gap, hand, point, way, failed))
+    if not program:
+        return "no_path", 0.0
+    reason = yield program
+    return reason, float(np.linalg.norm(world.com(name) - before))
+
+
+def _towards(world: PlannedWorld, name: str, other: str) -> list[tuple[Vector, float]]:
+    """Directions in which an object is pushed to reach another, with the gap between them, m."""
+    straight_way, gap = _gap(world, name, other)
+    found = list[tuple[Vector, float]]()
+    for side in SIDES:
+        c, s = np.cos(side), np.sin(side)
+        x, y, _ = straight_way
+        found.append((np.array([c * x - s * y, s * x + c * y, 0.0]), gap))
+    return found
 
 
 def _gap(world: PlannedWorld, name: str, other: str) -> tuple[Vector, float]:
@@ -99,17 +187,16 @@ def _gap(world: PlannedWorld, name: str, other: str) -> tuple[Vector, float]:
     return way, max(gap, 0.0)
 
 
-def _plan(world: PlannedWorld, name: str, other: str, hand: int, passed: int) -> tuple[Stance, Vector, Vector] | None:
-    """A stance, the point of the far face that is pushed, and the direction."""
-    straight, gap = _gap(world, name, other)
+def _plan(
+    world: PlannedWorld, name: str, ways: Sequence[tuple[Vector, float]], hand: int, passed: int
+) -> tuple[Stance, Vector, Vector, float] | None:
+    """A stance, the point of the far face that is pushed, the direction, and how far it is to go."""
     obstacles, floor, index = world.obstacles(), world.floor(), world.index(name)
     centre, far = world.com(name), 2.0
     seen = 0
 
-    def candidates() -> Iterator[tuple[Stance, Vector, Vector]]:
-        for side in SIDES:
-            c, s = np.cos(side), np.sin(side)
-            way = np.array([c * straight[0] - s * straight[1], s * straight[0] + c * straight[1], 0.0])
+    def candidates() -> Iterator[tuple[Stance, Vector, Vector, float]]:
+        for way, gap in ways:
             start = centre - far * way
             hit = float(obstacles.entries(start[None], way[None], index)[0])
             if not np.isfinite(hit):
@@ -119,11 +206,11 @@ def _plan(world: PlannedWorld, name: str, other: str, hand: int, passed: int) ->
             before = None if world.body.opening is None else (point, -way)  # a gripper points to where its robot looks
             for stance in stances(world, hand, point, floor, AWAY, STANCES, before=before):
                 if world.reaches(hand, stance, end) and points_ahead(world, way, stance.yaw):
-                    yield stance, point, way
+                    yield stance, point, way, gap
 
-    def has_way(candidate: tuple[Stance, Vector, Vector], search: bool) -> bool:
+    def has_way(candidate: tuple[Stance, Vector, Vector, float], search: bool) -> bool:
         nonlocal seen
-        stance, point, way = candidate
+        stance, point, way, _ = candidate
         fingers = _fingers(world, way)
         spheres, goal = world.spheres(fingers, way), point - BEHIND * way
         entries = [-way, UP, -ahead(stance.yaw)]
@@ -133,7 +220,7 @@ def _plan(world: PlannedWorld, name: str, other: str, hand: int, passed: int) ->
         seen += found
         return found and seen > passed
 
-    return first_way(candidates(), has_way, len(SIDES) * STANCES)
+    return first_way(candidates(), has_way, max(len(SIDES), len(ways)) * STANCES)
 
 
 def _fingers(world: PlannedWorld, way: Vector) -> Vector:
@@ -141,10 +228,9 @@ def _fingers(world: PlannedWorld, way: Vector) -> Vector:
     return UP if world.body.opening is None else np.cross(UP, way)
 
 
-def _program(world: PlannedWorld, name: str, other: str, hand: int, point: Vector, way: Vector, failed: int) -> Program:
-    """Goes behind the face, pushes up to a stroke, and goes back. `failed`: pushes that moved nothing: boxes may touch
-    where the objects do not, so the hand goes farther."""
-    _, gap = _gap(world, name, other)
+def _program(world: PlannedWorld, gap: float, hand: int, point: Vector, way: Vector, failed: int) -> Program:
+    """Goes behind the face, pushes up to a stroke, and goes back. `gap`: m that the object is to go. `failed`: pushes
+    that moved nothing: boxes may touch where the objects do not, so the hand goes farther."""
     fingers = _fingers(world, way)
     quat, start = world.body.turned(hand, fingers, way), point - BEHIND * way
     entries = [-way, UP, -ahead(world.base[1])]

@@ -20,6 +20,7 @@ from ig2mj.planning.world import PlannedWorld, Rotation, Vector
 from ig2mj.sampling.areas import WITHOUT_CONTACT, areas_for
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.placement import Placer
+from ig2mj.scene.manifest import OrientationEntry
 
 EASY = 0.35
 """m, horizontal, from the floor where a robot can stand up to which no spot is harder to reach than another."""
@@ -41,6 +42,15 @@ TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 
 ORIENTATIONS, ORIENTATION_SPREAD = 2, 1.7
 """Orientations at rest that are tried, and rad by which they may be farther from the present one than the nearest."""
+
+UPON = ((0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.0, 0.05), (0.0, -0.05))
+"""m from an object's centre of mass at which something is put upon it."""
+
+STANDS = 0.8
+"""Cosine of the angle of an object's own vertical up to which it stands upright."""
+
+CLOSE = 0.001
+"""m, slack of heights."""
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -79,7 +89,7 @@ def spots_for(
     without_contact = [c for c in requested if c.predicate in WITHOUT_CONTACT]
     placer, farther = Placer(world.query), _out_of_reach(world)
     middle = _middle_of_fixed_part(world, where) if predicate == "inside" else None
-    around = world.obstacles([name])
+    around = world.obstacles([name], stays=False)
     wide = max(CORNER, WIDE * float(np.sort(np.ptp(world.vertices(name), axis=0))[1]) / 2)
     turned = [(quat, angle) for quat in _upright(world, name) for angle in TURNS]
     if world.body.opening is not None:
@@ -108,6 +118,24 @@ def spots_for(
                     yield Spot(at, turn, bool(roofed[k]))
             if found:
                 break
+
+
+def spots_upon(world: PlannedWorld, name: str, where: str) -> Iterator[Spot]:
+    """Poses in which an object comes to touch another from above, the middle of its box above or near the other's
+    centre of mass, whatever else bears it: nothing says that it lies there level."""
+    own_pos, own_quat = world.pose(name)
+    corners = (world.vertices(name) - own_pos) @ matrices_on_host(own_quat[None])[0]
+    obstacles, index, centre = world.obstacles([name]), world.index(where), world.com(where)
+    top = float(world.vertices(where)[:, 2].max())
+    for quat, angle in [(quat, angle) for quat in _upright(world, name) for angle in TURNS]:
+        new = _yawed(quat, angle)
+        there = corners @ matrices_on_host(new[None])[0].T
+        low, high = there.min(0), there.max(0)
+        for aside in UPON:
+            xy = centre[:2] + np.array(aside)
+            height = obstacles.below(xy, top + CLOSE, [index])
+            if np.isfinite(height):
+                yield Spot(np.array([*(xy - (low + high)[:2] / 2), height - low[2]]), new)
 
 
 def grip_for(world: PlannedWorld, hand: int, name: str, spot: Spot) -> tuple[Vector, Float[np.ndarray, "4"], Rotation]:
@@ -179,13 +207,22 @@ def _middle_of_fixed_part(world: PlannedWorld, name: str) -> Vector:
     return (corners.min(0) + corners.max(0)) / 2
 
 
+def is_tipped(world: PlannedWorld, name: str) -> bool:
+    """Whether an object's own vertical is not upright."""
+    return float(matrices_on_host(world.pose(name)[1][None])[0][2, 2]) < STANDS
+
+
 def _upright(world: PlannedWorld, name: str) -> list[Float[np.ndarray, "4"]]:
-    """Orientations in which an object rests, each the nearest to its present one; that, where none is known."""
+    """Orientations in which an object rests, each the nearest to its present one; that, where none is known. Of what
+    opens, those come first in which it stands, so that it can be filled."""
     _, now = world.pose(name)
-    frame = matrices_on_host(now[None])[0]
-    found = []
-    for entry in world.stage.scene.manifest.objects[world.index(name)].orientations:
-        up = frame @ matrices_on_host(np.array([entry.quat], float))[0][2]  # the vertical of that orientation, now
+    frame, found = matrices_on_host(now[None])[0], []
+    own = [matrices_on_host(np.array([e.quat], float))[0][2] for e in _orientations(world, name)]
+    standing = [v for v in own if v[2] > STANDS]
+    if world.domain.opens(name) and standing:
+        own = standing
+    for vertical in own:
+        up = frame @ vertical  # that of the orientation, now
         axis, angle = np.cross(up, UP), float(np.arccos(np.clip(up[2], -1.0, 1.0)))
         axis = axis / np.linalg.norm(axis) if np.linalg.norm(axis) > 1e-6 else np.array([1.0, 0.0, 0.0])
         tilt = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])
@@ -193,6 +230,10 @@ def _upright(world: PlannedWorld, name: str) -> list[Float[np.ndarray, "4"]]:
     found.sort(key=lambda pair: pair[0])
     kept = [quat for angle, quat in found if angle < found[0][0] + ORIENTATION_SPREAD][:ORIENTATIONS]
     return kept or [now]
+
+
+def _orientations(world: PlannedWorld, name: str) -> Sequence[OrientationEntry]:
+    return world.stage.scene.manifest.objects[world.index(name)].orientations
 
 
 def _would_hold(

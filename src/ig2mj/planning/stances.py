@@ -18,10 +18,10 @@ from ig2mj.planning.world import PlannedWorld, Stance, Vector
 APART = 0.12
 """m between stances for the same point, at least."""
 
-SIDEWAYS = 0.4
-"""Cost of standing with a hand's side to a point. The hand's shoulder, the middle of the sphere that bounds its reach
-(iGibson's behavior_robot.py), is behind the body's axis and to the side, so that the hand reaches 0.3 m farther than
-ahead."""
+SIDEWAYS, AVERTED = 0.4, 1.0
+"""Cost of standing with a hand's side to a point, and with its shoulder as near to the point as the body brings it. The
+shoulder, the middle of the sphere that bounds a hand's reach (iGibson's behavior_robot.py), is behind the body's axis
+and to the side, so that the hand reaches 0.3 m farther than ahead to its side, and 6 cm more obliquely behind."""
 
 EFFORT = 1.0
 """m of way that a metre by which the body stoops, or stretches, counts as."""
@@ -51,17 +51,19 @@ def stances(
     here, _ = world.base
     side = world.body.carry[hand][1]
     away = max(away, world.body.away)
-    cells = floor.within(point[:2], world.body.reach + abs(float(world.body.shoulders[hand][1])))
+    back, aside, _ = (float(v) for v in world.body.shoulders[hand])
+    averts = back < 0.0  # else the shoulder is nearest to what it is ahead of
+    cells = floor.within(point[:2], world.body.reach + (np.hypot(back, aside) if averts else abs(aside)))
     middles = floor.occupancy.middles(cells)
     offset = point[:2] - middles
     apart = np.linalg.norm(offset, axis=1)
     bearing = np.arctan2(offset[:, 1], offset[:, 0])
-    yaw = np.concatenate(
-        [bearing - np.arctan2(0.6 * side, np.maximum(apart, 0.3)), bearing - np.sign(side) * np.pi / 2]
-    )
+    yaws = [bearing - np.arctan2(0.6 * side, np.maximum(apart, 0.3)), bearing - np.sign(side) * np.pi / 2]
+    yaws, costs = [*yaws, bearing - np.arctan2(aside, back)][: 2 + averts], (0.0, SIDEWAYS, AVERTED)[: 2 + averts]
+    yaw = np.concatenate(yaws)
     way = floor.distances(here, NEAR_START)[tuple(cells.T)]
     cost = 0.6 * way + 2.0 * np.abs(apart - away) - 0.5 * np.minimum(floor.spare[tuple(cells.T)], 0.2)
-    cost, middles = np.concatenate([cost, cost + SIDEWAYS]), np.concatenate([middles, middles])
+    cost, middles = np.concatenate([cost + more for more in costs]), np.tile(middles, (len(costs), 1))
     target = point if held is None else point + _turned_vectors(yaw, held)
     rise = _rise_from(world, hand, middles, yaw, target)
     cost += np.where(np.isnan(rise), np.inf, EFFORT * np.abs(rise))

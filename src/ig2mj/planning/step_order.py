@@ -36,9 +36,9 @@ def ordered(
 
     Args:
       missing: conditions that are false. failed: how often steps of a condition failed. held: what hands hold.
-      tool: what cleans or cuts for a condition. begun: condition that the last step was for; it is gone on with if it
-        has failed before, since its steps change what others need. stuck: conditions that failed in the world as it is
-        now; they come after the others.
+      tool: what cleans or cuts for a condition. begun: condition that the last step was for; it is gone on with if a
+        hand holds one of its objects, or it has failed before, since its steps change what others need. stuck:
+        conditions that failed in the world as it is now; they come after the others.
     """
     targets = list(dict.fromkeys(c.arguments[-1] for c in missing))
     first = sorted((c for c in missing if c.predicate in FIRST), key=lambda c: FIRST.index(c.predicate))
@@ -55,7 +55,11 @@ def ordered(
     tools = [c for c in order if c.predicate in ("dusty", "stained", "sliced") and tool(c) in held]
     order = list(dict.fromkeys([*tools, *in_hand, *order]))
     tried = [c for c in order if failed.get(c, 0) < GIVE_UP]
-    return sorted(tried, key=lambda c: (c != begun or not failed.get(c, 0), c in stuck, failed.get(c, 0) >= LATER))
+
+    def goes_on(c: Condition) -> bool:
+        return c == begun and (failed.get(c, 0) > 0 or (c.predicate in PLACE and any(a in held for a in c.arguments)))
+
+    return sorted(tried, key=lambda c: (not goes_on(c), c in stuck, failed.get(c, 0) >= LATER))
 
 
 def supports_first(places: Sequence[Condition]) -> list[Condition]:

@@ -29,7 +29,7 @@ from ig2mj.planning.moves import (
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
-from ig2mj.planning.placing import regrasp
+from ig2mj.planning.placing import bring_out, regrasp
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import AWAY, PlannedWorld, Rotation, Stance, Vector
@@ -74,7 +74,7 @@ def _hold_at(
     """
     missed = set[tuple[tuple[float, float], int]]()
     for _ in range(ATTEMPTS):
-        obstacles, floor, now = world.obstacles([name]), world.floor(), world.base[1]
+        obstacles, floor, now = world.obstacles([name], stays=False), world.floor(), world.base[1]
 
         def candidates(floor=floor, now=now) -> Iterator[_Holding]:
             for hold in holds():
@@ -91,19 +91,24 @@ def _hold_at(
             turn = about_vertical(stance.yaw - now)
             return hold.point + turn @ hold.offset, turn @ hold.tilt
 
+        def has_room(candidate: _Holding, obstacles=obstacles, aim=aim) -> bool:
+            stance, hold = candidate
+            target, turned = aim(stance, hold)
+            spheres = _spheres(world, name, hand, turned)
+            standing = world.standing(obstacles, stance, hand)
+            return standing.clear(np.column_stack([spheres[:, :3] + target, spheres[:, 3]]))
+
         def has_way(candidate: _Holding, search: bool, obstacles=obstacles, aim=aim) -> bool:
             stance, hold = candidate
             target, turned = aim(stance, hold)
             spheres = _spheres(world, name, hand, turned)
-            standing = obstacles.about(stance.xy, *world.body.trunk)
-            if not standing.clear(np.column_stack([spheres[:, :3] + target, spheres[:, 3]])):
-                return False
+            standing = world.standing(obstacles, stance, hand)
             start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
             back = [UP, -ahead(stance.yaw)]
             follows = world.follows(hand, world.turned_hand(hand, turned), standing, stance)
             return hand_path(standing, spheres, start, target, back, search=search, follows=follows) is not None
 
-        found = first_way(candidates(), has_way, WAYS if world.body.opening is None else ARM_WAYS)
+        found = first_way(filter(has_room, candidates()), has_way, WAYS if world.body.opening is None else ARM_WAYS)
         if found is None:
             return "no_path", [], -1
         stance, hold = found
@@ -217,10 +222,12 @@ def soak(world: PlannedWorld, step: Step) -> Primitive:
     tables = world.domain.model.tables
     links = np.flatnonzero((tables.link_object == world.index(tap)) & (tables.link_kind == LinkKind.WATER_SOURCE))
     source = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
-    reason, number, failed, again = "", -1, set[int](), False
-    for _ in range(SOAKS):
+    reason, number, failed, again, moved = "", -1, set[int](), False, set[str]()
+    for _ in range(SOAKS + MOST_MOVED):
         left = lambda hand=hand: [h for h in _holds_below(world, name, hand, source) if h.number not in failed]  # noqa: E731
         reason, way, number = yield from _hold_at(world, name, hand, left)
+        if number < 0 and (yield from _clear_basin(world, source, moved)) and name in world.held:
+            continue
         if number < 0 and not again and (yield from regrasp(world, name, hand)):  # by another side
             again, hand = True, hand_with(world, name)
             continue
@@ -235,6 +242,28 @@ def soak(world: PlannedWorld, step: Step) -> Primitive:
             return Outcome("slipped", f"the hand lost {name}")
     return Outcome(reason or "not_true_after", f"{name} did not take enough water")
 
+
+def _clear_basin(world: PlannedWorld, source: Vector, moved: set[str]) -> Generator[Program, str, bool]:
+    """Puts what stands or lies below a source of water, the nearest first, onto open floor; returns whether it did."""
+    if len(moved) == MOST_MOVED or all(world.held):
+        return False
+    near = list[tuple[float, str]]()
+    for other in world.domain.loose:
+        if other in world.held or other in moved or not world.domain.graspable(other):
+            continue
+        low, high = world.facts.box(other)
+        apart = float(np.linalg.norm(source[:2] - np.clip(source[:2], low[:2], high[:2])))
+        if apart < BASIN and low[2] < source[2] and high[2] > source[2] - DEPTH:
+            near.append((apart, other))
+    if not near:
+        return False
+    moved.add(min(near)[1])
+    return (yield from bring_out(world, min(near)[1])).done
+
+
+BASIN, DEPTH, MOST_MOVED = 0.25, 0.5, 3
+"""m, horizontal, from a source of water, and below it, within which things are put elsewhere where nothing else can be
+held below it, and how many."""
 
 BELOW_TAP, SOAKS = (0.065, 0.1, 0.15), 3
 """m below a source of water at which the top of what is soaked is held: drops begin 5 cm below it; and ways of holding

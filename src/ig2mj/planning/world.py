@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import PhysicsView
-from ig2mj.geometry.host_rotations import matrix_to_quat
+from ig2mj.geometry.host_rotations import about_vertical, matrix_to_quat
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.bodies import ALONG, Follower, HandedBody, Senses, grip_of, sense
 from ig2mj.planning.clearance import Obstacles
@@ -29,6 +29,9 @@ from ig2mj.states.particles import world_normals, world_positions
 
 HELD_POINTS, HELD_MARGIN, LATTICE = 60, 0.012, 0.04
 """Corners of what a hand holds that keep clear, and points within it, about; m by which they do, and between them."""
+
+CARRIED = 0.03
+"""m about points of what other hands hold that a hand keeps clear of."""
 
 BODY_SPARE = 0.04
 """m that are left between the body and what it carries."""
@@ -142,10 +145,32 @@ class PlannedWorld:
         """kg, of the whole object."""
         return float(self.domain.model.tables.object_mass[self.index(name)])
 
-    def obstacles(self, without: Collection[str] = (), at: Stance | None = None) -> Obstacles:
-        """Pieces of everything but some objects; `at`: and the robot's body, if it stood there."""
-        found = self.planner.obstacles(self.view, [self.index(n) for n in without], self.world)
+    def obstacles(self, without: Collection[str] = (), at: Stance | None = None, stays: bool = True) -> Obstacles:
+        """Pieces of everything but some objects.
+
+        Args:
+          at: and the robot's body, if it stood there. stays: the robot stands where it is; else what its hands hold is
+            not where it is now (`standing`).
+        """
+        moved = [] if stays else [n for n in self.held if n and not self.domain.fixed(n)]
+        found = self.planner.obstacles(self.view, [self.index(n) for n in (*without, *moved)], self.world)
         return found if at is None else found.about(at.xy, *self.body.trunk)
+
+    def standing(self, obstacles: Obstacles, stance: Stance, hand: int) -> Obstacles:
+        """The same with the robot's body, if it stood there, and what hands but one would hold there."""
+        here, yaw = self.base
+        now = np.array([*here, self.stance.rise])
+        then, turn = np.array([*stance.xy, stance.rise]), about_vertical(stance.yaw - yaw)
+        points = [
+            (self.points(name) - now) @ turn.T + then
+            for other, name in enumerate(self.held)
+            if name and other != hand and name != self.held[hand] and not self.domain.fixed(name)
+        ]
+        found = obstacles.about(stance.xy, *self.body.trunk)
+        if not points:
+            return found
+        carried = np.concatenate(points)
+        return found.beside(np.column_stack([carried, np.full(len(carried), CARRIED)]))
 
     @property
     def stance(self) -> Stance:
@@ -228,20 +253,25 @@ class PlannedWorld:
         return self.body.axes(hand, frame)
 
     def floor(
-        self, holding: bool = False, reaching: bool = False, ahead: bool = False, without: Collection[int] = ()
+        self,
+        holding: bool = False,
+        reaching: bool = False,
+        ahead: bool = False,
+        without: Collection[int] = (),
+        view: PhysicsView | None = None,
     ) -> FreeFloor:
         """Where the robot can stand, without regard to what it holds.
 
         Args:
           holding: in any direction with what it holds. reaching: empty hands are where they rest, not tucked.
           ahead: with `holding`: only how far that reaches to the sides counts, as on a straight way ahead.
-          without: objects that do not count.
+          without: objects that do not count. view: of one world, with things elsewhere; None: as they are.
         """
-        view, number, hands = self.view, self.world, self.body.hands
+        number, hands = self.world, self.body.hands
         held = [n if n and not self.domain.fixed(n) else "" for n in self.held]
         counts = hands.tolist() if isinstance(self.body, HandedBody) else []
         arm = self.body.arm.tolist() if counts else []
-        footprint = BaseFootprint.of_robot(self.stage.scene, view, self.stage.agent, number, counts, arm)
+        footprint = BaseFootprint.of_robot(self.stage.scene, self.view, self.stage.agent, number, counts, arm)
         if counts and (holding or not any(held)):
             row = np.zeros(0) if self.senses.joints is None else self.senses.joints[number].astype(float)
             spheres = self.body.arm_spheres(row, not any(held))
@@ -264,7 +294,9 @@ class PlannedWorld:
         if not self.body.sideways and not self.crosses:
             footprint = footprint.on_wheels()
         without = [*without, *(self.index(n) for n in held if n)]
-        return self.planner.floor(view, footprint, without, number)
+        if view is not None:
+            return self.planner.floor(view, footprint, without)
+        return self.planner.floor(self.view, footprint, without, number)
 
     def away(self, spheres: Float[np.ndarray, "S 4"]) -> float:
         """m, horizontal, that a base would like to be from where a hand puts what it holds, whose spheres these are."""

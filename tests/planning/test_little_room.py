@@ -1,0 +1,130 @@
+"""Grasps below furniture, stances for what is hardly in reach, places on what is thin, and what bars the way."""
+
+import dataclasses
+import types
+
+import numpy as np
+import pytest
+
+import ig2mj
+from ig2mj.agents import Humanoid
+from ig2mj.planning import grasps
+from ig2mj.planning.body_kinds import body_of
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.domain import Domain
+from ig2mj.planning.free_floor import FreeFloor
+from ig2mj.planning.motion_planner import MotionPlanner
+from ig2mj.planning.pushing import _ways_aside
+from ig2mj.planning.spots import spots_upon
+from ig2mj.planning.stances import stances
+from ig2mj.planning.world import AWAY, PlannedWorld
+from ig2mj.sampling.query import SceneQuery
+from ig2mj.worlds.rules import Rules
+
+
+@pytest.fixture(scope="module")
+def world(tiny_home_folder):
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[Humanoid().at(-0.9, -0.5, 0.0)])
+    body = body_of(scene, scene.agents[0].controller(scene.tables, 0, 0.1))
+    query = SceneQuery(scene)
+    view, start = query.view, query.save()
+    model = Rules.of_scene(scene).model
+    stage = types.SimpleNamespace(
+        scene=scene,
+        view=view,
+        model=model,
+        states=None,
+        snapshot=lambda world: start,
+        agent=0,
+        controller=None,
+        num_worlds=1,
+        by_friction=False,
+        act=print,
+        ended=print,
+    )
+    domain = Domain(model, 2)
+    return PlannedWorld(stage, body, domain, MotionPlanner(scene), query, 0, np.random.default_rng(0))
+
+
+class _Ceiling(Obstacles):
+    """A floor and a ceiling above it, m."""
+
+    def __init__(self, inner: Obstacles, floor: float, ceiling: float):
+        self._inner, self._floor, self._ceiling = inner, floor, ceiling
+
+    def entries(self, *args, **kwargs):
+        return self._inner.entries(*args, **kwargs)
+
+    def distance(self, points):
+        return np.minimum(points[..., 2] - self._floor, self._ceiling - points[..., 2])
+
+
+def test_a_hand_goes_in_between_a_thing_and_what_is_above_it(world):
+    low, high = (float(corner[2]) for corner in (world.vertices("book").min(0), world.vertices("book").max(0)))
+
+    def nearest(room):
+        poses = grasps.grasp_poses(world, "book", _Ceiling(world.obstacles(["book"]), low, high + room))
+        return {p.before for p in poses if p.palm[2] < -0.9}
+
+    assert nearest(0.3) == {grasps.BEFORE[0]}
+    assert nearest(0.075) == {grasps.FLAT}
+    assert nearest(0.05) == set()
+
+
+def test_the_body_turns_its_shoulder_to_what_is_hardly_in_reach(world):
+    whole = world.floor()
+    cell = whole.nearest(world.base[0], 0.2)
+    free = np.zeros_like(whole.free)
+    free[tuple(cell)] = True
+    floor = FreeFloor(whole.occupancy, free, np.where(free, 0.1, -0.1))
+    middle = whole.occupancy.middles(cell)
+    _, aside, height = world.body.shoulders[1]
+
+    def found(beyond):
+        away = world.body.reach + beyond
+        point = np.array([middle[0], middle[1] - away, world.body.stands + height])
+        return point, list(stances(world, 1, point, floor, AWAY))
+
+    farthest = float(np.hypot(*world.body.shoulders[1][:2]))
+    point, some = found((abs(aside) + farthest) / 2)
+    assert some and all(world.reaches(1, stance, point) for stance in some)
+    assert not found(farthest + 0.02)[1]
+
+
+def test_an_object_is_put_upon_another_over_its_middle_first(world):
+    spots = list(spots_upon(world, "apple", "book"))
+    own = world.vertices("apple") - world.pose("apple")[0]
+    assert np.allclose(spots[0].pos[:2], world.com("book")[:2], atol=0.01)
+    top = world.vertices("book")[:, 2].max()
+    assert spots[0].pos[2] + own[:, 2].min() == pytest.approx(top, abs=0.003)
+
+
+def test_what_bars_the_way_is_pushed_as_little_as_frees_it_and_not_into_furniture(world):
+    pos = world.com("ball")
+
+    def frees(floor):
+        return floor.nearest(pos[:2], 0.06) is not None
+
+    assert not frees(world.floor())
+    ways = _ways_aside(world, "ball", frees, [])
+    assert ways and [far for _, far in ways] == sorted(far for _, far in ways)
+    obstacles = world.obstacles(["ball"])
+    for way, far in ways:
+        assert obstacles.distance((pos + far * way)[None])[0] > 0.09
+    assert _ways_aside(world, "ball", lambda floor: False, []) == []
+
+
+def test_what_another_hand_holds_is_in_the_way_where_the_robot_will_stand(world, monkeypatch):
+    (x, y), yaw = world.base
+    stance = dataclasses.replace(world.stance, xy=(float(x), float(y) - 0.5), yaw=yaw - np.pi / 2)
+    monkeypatch.setattr(PlannedWorld, "held", property(lambda self: ["", "can"]))
+    ahead, left, up = world.com("can") - np.array([x, y, 0.0])
+    there = np.array([*stance.xy, 0.0]) + np.array([left, -ahead, up])
+
+    def clear(obstacles, point):
+        return obstacles.clear(np.array([[*point, 0.01]]))
+
+    empty, elsewhere = world.obstacles(), world.obstacles(stays=False)
+    assert not clear(empty, world.com("can")) and clear(elsewhere, world.com("can"))
+    assert not clear(world.standing(elsewhere, stance, 0), there)
+    assert clear(world.standing(elsewhere, stance, 1), there)
