@@ -40,5 +40,7 @@ def test_a_home_takes_no_robot_and_no_grasping(capsys):
     assert "near matches: CookingMeat" in capsys.readouterr().err
     assert call(["warm-up", "CookingMeat", "--grasping", "firm", "--worlds", "1"]) == 2
     assert "firm" in capsys.readouterr().err
-    assert call(["warm-up", "CookingMeat", "--arch", "90", "--observations", "rgb"]) == 2
-    assert "need the GPU itself" in capsys.readouterr().err
+    assert call(["warm-up", "small_home", "--homes", "train"]) == 2
+    assert "belong to environments" in capsys.readouterr().err
+    assert call(["warm-up", "CookingMeat", "--arch", "90", "--randomize", "light"]) == 2
+    assert "near matches: lights" in capsys.readouterr().err

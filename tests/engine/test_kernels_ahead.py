@@ -57,7 +57,7 @@ def test_no_kernel_waits_for_a_tile_while_it_is_written(tiny_home, tmp_path, mon
 def test_kernels_are_chosen_as_on_a_gpu():
     class Asked(WarpEngine):
         def __init__(self):
-            self.seen = []
+            self.seen, self.launches_of_others = [], []
 
         def launches(self):
             device = wp.get_device()

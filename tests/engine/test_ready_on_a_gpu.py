@@ -20,6 +20,7 @@ from ig2mj.engine.warp.patches import scratch
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp
 from ig2mj.process.compilation import XLA_EVENT
+from ig2mj.process.together import TOGETHER
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.rules import Rules
 
@@ -159,6 +160,27 @@ def test_a_second_engine_begins_when_the_first_has_ended(engine, held, monkeypat
     held.set()
     other.join(60)
     assert asked == [True]
+
+
+def test_engines_of_a_block_are_made_without_waiting_for_each_others_kernels(engine, loaded, gpu, monkeypatch):
+    monkeypatch.setattr("ig2mj.engine.warp.engine.own_device", gpu_of_jax)
+    with TOGETHER.block():
+        engine._get_ready(gpu_of_jax(), "meanwhile")
+        first = engine.loading
+        engine._get_ready(gpu_of_jax(), "meanwhile")  # as another one would
+        engine.load_also(engine.launches(scratch.Counter(gpu.default_allocator))[:1])
+        every = [first, engine.loading, *engine.loading_of_others]
+        assert len(every) == 3 and not loaded and not any(loading.done() for loading in every)
+    counts = {loading.result(60) for loading in every}
+    assert counts == {len([item for item in loaded if isinstance(item, tuple)])}, "each module is loaded once"
+
+
+def test_worlds_may_start_inside_the_block(engine, loaded, gpu):
+    with TOGETHER.block():
+        engine._get_ready(gpu_of_jax(), "meanwhile")
+        engine.load_also([])
+        engine._wait_for_kernels()  # as `reset` does
+        assert engine.loading.done() and engine.loading_of_others[0].done()
 
 
 def test_an_interrupted_wait_can_be_repeated(engine, held, monkeypatch):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import tyro
 
@@ -12,7 +12,9 @@ from ig2mj.cli.common.objects import AddedObjects
 from ig2mj.cli.common.own_robot import NONE, Own, choose_robot
 
 if TYPE_CHECKING:
+    from ig2mj.engine.warp.engine import WarpEngine
     from ig2mj.envs.environment import Environment
+    from ig2mj.envs.several_homes import HomesEnvironment
     from ig2mj.worlds import Worlds
 
 
@@ -24,6 +26,9 @@ def run(
     grasping: str | None = None,
     observations: tuple[str, ...] = (),
     engine: str | None = None,
+    homes: str = "",
+    randomize: str = "",
+    looks: str | None = None,
     object: AddedObjects = (),
     arch: int | None = None,
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FOLDER")] = None,
@@ -42,9 +47,12 @@ def run(
       grasping: for an environment: mitten, assisted, sticky or physical.
       observations: for an environment: additional observations, e.g. rgb depth.
       engine: native, warp or jax; default: warp on a GPU, else native.
+      homes: for an environment: train, held_out, or names of homes with commas; worlds are shared out over them.
+      randomize: for an environment: axes of `ig2mj.Randomize` with commas, or all.
+      looks: for an environment: how cameras see the home: day, night or plain.
       object: {object}.
-      arch: compile the kernels of a physics step for GPUs of this architecture (compute capability times ten: 90 is
-        an H100 or H200); this machine needs none. JAX's programs and rendering are compiled where the GPU is.
+      arch: compile the kernels of physics and images for GPUs of this architecture (compute capability times ten: 90
+        is an H100 or H200); this machine needs none. JAX's programs are compiled where the GPU is.
       out: folder of the cache; default: IG2MJ_CACHE_DIR, or the user's own.
       json: print one JSON object.
     """
@@ -57,7 +65,8 @@ def run(
 
     if out is not None:
         keep_compiled_in(out)
-    batch = WarmUpBatch(what, worlds, choose_robot(robot, own), grasping, observations, engine, object)
+    options = {"homes": homes, "randomize": randomize, "looks": looks}
+    batch = WarmUpBatch(what, worlds, choose_robot(robot, own), grasping, observations, engine, object, **options)
     seconds = _timed(batch) if arch is None else _ahead(batch, arch)
     seconds["all"] = time.perf_counter() - began
     folder = cache_folder()
@@ -85,24 +94,30 @@ class WarmUpBatch:
     observations: tuple[str, ...]
     engine: str | None
     objects: tuple[str, ...] = ()
+    homes: str = ""
+    randomize: str = ""
+    looks: str | None = None
 
-    def make(self, pool_size: int | None = None) -> Worlds | Environment:
+    def make(self, pool_size: int | None = None) -> Worlds | Environment | HomesEnvironment:
         """Raises Ig2mjError: a home with options of environments."""
         import ig2mj
         from ig2mj.envs.names import NAMESPACE
         from ig2mj.envs.registry import VECTORS, is_environment, list_envs
         from ig2mj.errors import Ig2mjError, UnknownNameError
+        from ig2mj.learn.run_config import RunSettings
         from ig2mj.scene.paths import SHIPPED_HOMES, shipped_homes
 
         if is_environment(self.what):
             seen = (*VECTORS, *self.observations)
             options: dict[str, Any] = {"observations": seen, "pool_size": pool_size, "objects": self.objects}
+            options |= {"looks": self.looks, **RunSettings(homes=self.homes, randomize=self.randomize).varied}
             return ig2mj.make(self.what, self.robot, self.worlds, self.engine, self.grasping, **options)
         if not (pathlib.Path(self.what).exists() or (SHIPPED_HOMES / self.what).is_dir()):
             short = self.what.removeprefix(f"{NAMESPACE}/")
             raise UnknownNameError("home or environment", short, (*shipped_homes(), *list_envs()))
-        if self.robot is not None or self.grasping is not None or self.observations:
-            raise Ig2mjError("--robot, --grasping and --observations belong to environments; a home is stepped without")
+        if any((self.robot, self.grasping, self.observations, self.homes, self.randomize, self.looks)):
+            names = "--robot, --grasping, --observations, --homes, --randomize and --looks"
+            raise Ig2mjError(f"{names} belong to environments; a home is stepped without")
         return ig2mj.Worlds(self.what, self.worlds, self.engine, objects=self.objects)
 
 
@@ -115,20 +130,19 @@ def _ahead(batch: WarmUpBatch, architecture: int) -> dict[str, float]:
     import time
 
     from ig2mj.engine.warp import ahead
-    from ig2mj.engine.warp.engine import WarpEngine
+    from ig2mj.envs.several_homes import HomesEnvironment
     from ig2mj.errors import Ig2mjError
     from ig2mj.worlds import Worlds
 
     if batch.engine not in (None, "warp"):
         raise Ig2mjError(f"--arch compiles kernels of the Warp engine; engine {batch.engine!r} has none")
-    if batch.observations:
-        raise Ig2mjError("--arch compiles the kernels of a physics step; those of --observations need the GPU itself")
     ahead.check(architecture)
     began = time.perf_counter()
     made = dataclasses.replace(batch, worlds=min(batch.worlds, MOST_WORLDS), engine="warp").make(pool_size=1)
-    warp = made.engine if isinstance(made, Worlds) else made.core.engine
-    assert isinstance(warp, WarpEngine)
-    launches = ahead.launches_on_gpu(warp)
+    parts = made.envs if isinstance(made, HomesEnvironment) else (made,)
+    engines = [part.engine if isinstance(part, Worlds) else part.core.engine for part in parts]
+    launches = [launch for engine in engines for launch in ahead.launches_on_gpu(cast("WarpEngine", engine))]
+    launches = list(dict.fromkeys(launches))
     found = time.perf_counter()
     ahead.compile_for(launches, architecture)
     return {"making": found - began, "kernels": time.perf_counter() - found}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
 import typing
@@ -13,6 +14,7 @@ from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.process.imports import find_devices, import_mjx
+from ig2mj.process.together import TOGETHER
 from ig2mj.scene.scene import Scene
 
 ENGINES = {
@@ -48,6 +50,12 @@ def choose_engine(engine: str | Engine | None) -> str | Engine:
 
         return "warp" if jax.default_backend() == "gpu" else "native"
     return engine
+
+
+def made_together() -> contextlib.AbstractContextManager[None]:
+    """A block in which engines and what sees their worlds are made before any of their kernels is loaded: kernels of
+    all of them are loaded together, from its end on. Worlds that start inside it do not wait for the end."""
+    return TOGETHER.block()
 
 
 @entry_point

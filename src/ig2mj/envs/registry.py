@@ -24,7 +24,7 @@ from ig2mj.agents.grasping import MODES, Grasping
 from ig2mj.agents.registry import find_robot, is_robot_folder
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.engine.base import whole_number
-from ig2mj.engine.registry import check_options, choose_engine, make_engine
+from ig2mj.engine.registry import check_options, choose_engine, made_together, make_engine
 from ig2mj.envs.config import VECTORS, EnvConfig, Overrides, default_of
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, activity_name, short_name, unknown_environment
@@ -205,7 +205,10 @@ def make(
         chosen = EnvConfig().override(robot=config)
     chosen = chosen.override(config_overrides, **overrides)
     requested = requested_homes(task, chosen, homes)
-    return _make(task, chosen) if requested is None else _make_several(task, chosen, requested)
+    if requested is not None:
+        return _make_several(task, chosen, requested)
+    with made_together():
+        return _make(task, chosen)
 
 
 def _make_several(task: AnyTask, config: EnvConfig, homes: tuple[str, ...]) -> HomesEnvironment:
@@ -216,10 +219,11 @@ def _make_several(task: AnyTask, config: EnvConfig, homes: tuple[str, ...]) -> H
     if config.worlds < len(homes):
         raise EngineError(f"{config.worlds} worlds in {len(homes)} homes: give each home at least one (worlds=...)")
     shares = [config.worlds // len(homes) + (k < config.worlds % len(homes)) for k in range(len(homes))]
-    made = [
-        _make(task, dataclasses.replace(config, home=home, worlds=share))
-        for home, share in zip(homes, shares, strict=True)
-    ]
+    with made_together():
+        made = [
+            _make(task, dataclasses.replace(config, home=home, worlds=share))
+            for home, share in zip(homes, shares, strict=True)
+        ]
     return HomesEnvironment(made)
 
 

@@ -26,6 +26,7 @@ from mujoco import mjx
 from ig2mj.engine.base import Engine
 from ig2mj.engine.mjx.physics import MjxPhysics, own_device
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.warp.kernels import models_put
 from ig2mj.engine.warp.patches import graphs_kept, pins
 from ig2mj.engine.warp.unwritten import unwritten_is_zero
 from ig2mj.errors import EngineError
@@ -41,6 +42,7 @@ from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, camera_id, c
 from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, mergeable, rigid_parts, robot_geoms, tables_of
 from ig2mj.sensors.particle_slots import fill_slots, slot_kinds
 from ig2mj.sensors.ray_cameras import sectors_of, set_rays, set_rows
+from ig2mj.sensors.render_kernels import launches_of_images
 from ig2mj.sensors.render_model import BACKGROUND, make_render_model, mean_colours
 from ig2mj.sensors.slots import Slots
 from ig2mj.sensors.texture_filter import fit_textures
@@ -132,7 +134,8 @@ class BatchCamera:
             fit_textures(host, float(2 * np.tan(np.deg2rad(host.cam_fovy[self.cameras].min()) / 2) / height))
         self._covered = {} if looks == PLAIN else covered_triangles(engine.scene)
         self._plan(host)
-        self._model = mjx.put_model(host, own_device(), impl="warp")
+        with models_put() as put:
+            self._model = mjx.put_model(host, own_device(), impl="warp")
         if self._lit:  # the last light only carries the colour of the one at the camera
             self._model = self._model.replace(light_active=self._model.light_active.at[-1].set(False))
         if self._zooms:
@@ -159,6 +162,7 @@ class BatchCamera:
         )
         self._served = [str(wp.get_device())]
         self._make_context()
+        engine.load_also(launches_of_images(put[0], self._context._default))  # pyright: ignore[reportAttributeAccessIssue]
 
     def prepare_devices(self, devices: Sequence[Any]) -> None:
         """Allocates memory on other devices of this process, before programs for them are compiled.

@@ -9,6 +9,7 @@ Axes: W worlds, P rows, K choices, R roles, O objects.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Sequence
 
@@ -21,7 +22,8 @@ from jaxtyping import Bool, Float, Int, UInt
 from ig2mj.engine.layout import make_layout
 from ig2mj.engine.snapshot import FULLY_AWAKE
 from ig2mj.engine.view import Array
-from ig2mj.geometry.poses import quat_to_matrix
+from ig2mj.errors import EngineError
+from ig2mj.geometry.poses import matrices_on_host, namespace, quat_to_matrix
 from ig2mj.scene.additions import HEIGHT
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.pool import Pool
@@ -123,15 +125,15 @@ class ModelSwaps:
 
     def fits(self, pool: Pool) -> Bool[np.ndarray, "P K"]:
         """Whether the objects of each choice go into each row without reaching into anything. On the host."""
-        model, data = self.scene.model, mujoco.MjData(self.scene.model)
-        owner, swapped = self.scene.tables.geom_object, jax.jit(self.swapped)
+        tables, start = self.scene.tables, np.asarray(pool.physics.scene.qpos)
+        swapping = np.isin(tables.geom_object, np.unique([*self._base, *self._other.ravel()]))
+        model = only_contacts_of(self.scene.model, swapping)
+        data = mujoco.MjData(model)
         found = np.ones((pool.size, len(self.names)), bool)
         for k, objects in enumerate(self._other):
             if (objects == self._base).all():
                 continue
-            with jax.ensure_compile_time_eval():  # also while a program is traced
-                rows = swapped(pool.rows(np.arange(pool.size)), jnp.full(pool.size, k))
-                qpos = np.asarray(rows.physics.scene.qpos)
+            qpos = self._with_others(start, objects)
             for row in range(pool.size):
                 data.qpos[:] = self._away
                 data.qpos[: qpos.shape[1]] = qpos[row]
@@ -139,21 +141,61 @@ class ModelSwaps:
                 mujoco.mj_comPos(model, data)
                 mujoco.mj_collision(model, data)
                 contact = data.contact
-                mine = np.isin(owner[contact.geom], objects).any(1) if len(contact.dist) else np.zeros(0, bool)
-                found[row, k] = not (contact.dist[mine] < -DEEP).any()
+                mine = np.isin(tables.geom_object[contact.geom], objects).any(1) if len(contact.dist) else []
+                found[row, k] = not (contact.dist[mine] < -DEEP).any() if len(contact.dist) else True
         return found
+
+    def _with_others(self, qpos: Float[np.ndarray, "P q"], objects: Int[np.ndarray, "R"]) -> Float[np.ndarray, "P q"]:
+        """Coordinates of rows with these objects in place, as `swapped` has them. On the host."""
+        qpos = qpos.copy()
+        for base, other in zip(self._base, objects, strict=True):
+            if base == other:
+                continue
+            at, to = self._columns(int(base)), self._columns(int(other))
+            pose, waits = qpos[:, at], qpos[:, to]  # copies
+            qpos[:, at], qpos[:, to] = waits, self._placed(pose, np.full(len(qpos), base), np.full(len(qpos), other))
+        return qpos
 
     def _columns(self, number: int) -> np.ndarray:
         return int(self._address[number]) + np.arange(7)
 
     def _placed(self, pose: Float[Array, "W 7"], base: Int[Array, "W"], other: Int[Array, "W"]) -> Float[Array, "W 7"]:
         """The pose of another object in the place of one."""
-        turn = quat_to_matrix(pose[:, 3:])
+        xp = namespace(pose)
+        turn = matrices_on_host(pose[:, 3:]) if isinstance(pose, np.ndarray) else quat_to_matrix(pose[:, 3:])
 
         def low(which: Array) -> Float[Array, "W 3"]:
-            middle = jnp.einsum("wij,wj->wi", turn, jnp.asarray(self._centre, jnp.float32)[which])
-            half = jnp.einsum("wij,wj->wi", jnp.abs(turn), jnp.asarray(self._half, jnp.float32)[which])
-            return jnp.asarray(middle).at[:, 2].add(-half[:, 2])
+            middle = xp.einsum("wij,wj->wi", turn, xp.asarray(self._centre, xp.float32)[which])
+            half = xp.einsum("wij,wj->wi", xp.abs(turn), xp.asarray(self._half, xp.float32)[which])
+            return middle - half * np.array([0.0, 0.0, 1.0], np.float32)
 
         pos = pose[:, :3] + low(base) - low(other)
-        return jnp.concatenate([pos + np.array([0, 0, CLEAR], np.float32), pose[:, 3:]], axis=1)
+        return xp.concatenate([pos + np.array([0, 0, CLEAR], np.float32), pose[:, 3:]], axis=1)
+
+
+def only_contacts_of(model: mujoco.MjModel, geoms: Bool[np.ndarray, "G"]) -> mujoco.MjModel:
+    """A copy of a model in which collision detection finds the contacts of these geoms, and of no two others.
+
+    Each pair of collision masks among the geoms gets a bit of its own, which is the only one of their `contype`; the
+    `conaffinity` of a geom has the bits of the masks that it collides with.
+
+    Raises:
+      EngineError: the geoms have more than 31 different masks.
+    """
+    masks = np.stack([model.geom_contype, model.geom_conaffinity], axis=1)
+    kinds, kind = np.unique(masks[geoms], axis=0, return_inverse=True)
+    if len(kinds) > 31:
+        raise EngineError(f"objects whose models differ have {len(kinds)} different collision masks; 31 are possible")
+    meets = (masks[:, :1] & kinds[:, 1]) | (masks[:, 1:] & kinds[:, 0])  # [G, masks]
+    bits = 1 << np.arange(len(kinds))
+    own = copy.copy(model)
+    own.geom_contype[:] = 0
+    own.geom_contype[geoms] = bits[kind.ravel()]
+    own.geom_conaffinity[:] = ((meets != 0) * bits).sum(axis=1)
+    for of_body, of_geom in (
+        (own.body_contype, own.geom_contype),
+        (own.body_conaffinity, own.geom_conaffinity),
+    ):
+        of_body[:] = 0
+        np.bitwise_or.at(of_body, own.geom_bodyid, of_geom)
+    return own

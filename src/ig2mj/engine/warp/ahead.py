@@ -39,7 +39,8 @@ def check(architecture: int) -> None:
 
 
 def launches_on_gpu(engine: WarpEngine) -> list[kernels.Launch]:
-    """The kernels of the engine's step as a GPU launches them, on a machine with or without one."""
+    """The kernels of the engine's step and of the cameras that see its worlds, as a GPU launches them, on a machine
+    with or without one."""
     here = wp.get_device
     as_gpu = ScopedReplacement()
     as_gpu.add(
@@ -49,7 +50,7 @@ def launches_on_gpu(engine: WarpEngine) -> list[kernels.Launch]:
         }
     )
     with as_gpu.entered():
-        return engine.launches()
+        return [*engine.launches(), *engine.launches_of_others]
 
 
 def compile_for(launches: list[kernels.Launch], architecture: int, workers: int | None = None) -> int:

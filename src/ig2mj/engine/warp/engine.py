@@ -48,6 +48,7 @@ class WarpEngine(MjxEngine):
       profile: sizes of its buffers.
       own_kernels: its programs run our functions in place of some of MuJoCo Warp's (`ig2mj.engine.warp.patches`).
       loading: of its kernels, which may have ended; None: they are not loaded beforehand.
+      launches_of_others, loading_of_others: of what reads its worlds (`load_also`).
     """
 
     name = "warp"
@@ -101,6 +102,8 @@ class WarpEngine(MjxEngine):
         super().__init__(scene, num_worlds, initial=initial, **options)
         self._scratch, self._launches = 0, list[kernels.Launch]()
         self.loading: concurrent.futures.Future[int] | None = None
+        self.launches_of_others = list[kernels.Launch]()
+        self.loading_of_others = list[concurrent.futures.Future[int]]()
         self._has_begun = False
         if own_device().platform == "gpu":  # on processors only some tests make steps
             self._get_ready(own_device(), compile_beforehand)
@@ -123,8 +126,15 @@ class WarpEngine(MjxEngine):
 
     def _wait_for_kernels(self) -> None:
         """Raises an EngineError, each time, where they could not be compiled or loaded."""
+        for loading in () if self.loading is None else (self.loading, *self.loading_of_others):
+            kernels.loaded(loading, self.scene.name)
+
+    def load_also(self, launches: list[kernels.Launch]) -> None:
+        """Loads kernels of what reads its worlds, such as a camera, where its own are loaded beforehand; `reset` waits
+        for them, too."""
+        self.launches_of_others += launches
         if self.loading is not None:
-            kernels.loaded(self.loading, self.scene.name)
+            self.loading_of_others.append(kernels.load_meanwhile(launches, wp.device_from_jax(own_device())))
 
     def pending_reset_program(self) -> Traced | None:
         """See `Engine.pending_reset_program`."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import contextlib
+import dataclasses
 import os
 import pathlib
 import threading
@@ -30,6 +31,7 @@ from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.errors import EngineError
 from ig2mj.process.gc_pause import GC_PAUSED
+from ig2mj.process.together import TOGETHER
 from ig2mj.process.warp_repairs import AWAITED
 from ig2mj.process.worker_threads import ENDING, WorkerThreads, spawn
 
@@ -153,7 +155,9 @@ def load(launches: list[Launch], device: wp.Device | None = None, workers: int |
     Returns:
       How many modules were loaded.
     """
-    return load_meanwhile(launches, device, workers).result()
+    loading = load_meanwhile(launches, device, workers)
+    TOGETHER.flush()
+    return loading.result()
 
 
 def load_meanwhile(
@@ -162,10 +166,38 @@ def load_meanwhile(
     """As `load`, and returns at once. Nothing that needs these kernels may run before `loaded` has returned; a CUDA
     graph that is captured all the same waits for the end.
 
-    Begins when what was begun before has ended (`wait_for_others`). Python's garbage collector is off until the end: it
-    would visit everything that was just imported and made, while programs are still to be traced.
+    Begins at the end of the block of `TOGETHER` that this thread is in, with all other requests of the block, and when
+    what was begun before has ended (`wait_for_others`). Python's garbage collector is off until the end: it would visit
+    everything that was just imported and made, while programs are still to be traced.
     """
-    on = wp.get_device(device)
+    request = _Request(launches, wp.get_device(device), workers, concurrent.futures.Future())
+    TOGETHER.add(_begin, request)
+    return request.done
+
+
+@dataclasses.dataclass(frozen=True)
+class _Request:
+    """Arguments of `load_meanwhile`, and what it returns."""
+
+    launches: list[Launch]
+    device: wp.Device
+    workers: int | None
+    done: concurrent.futures.Future[int]
+
+    def cancel(self) -> None:
+        self.done.cancel()
+
+
+def _begin(requests: list[_Request]) -> None:
+    """Begins to load what is requested, one device after the other."""
+    on = {request.device.alias: request.device for request in requests}
+    for alias, device in on.items():
+        _begin_on(device, [request for request in requests if request.device.alias == alias])
+
+
+def _begin_on(on: wp.Device, requests: list[_Request]) -> None:
+    launches = list(dict.fromkeys(launch for request in requests for launch in request.launches))
+    workers = requests[0].workers
     with _TURN:
         wait_for_others()
         by_size = modules_of(launches, one_thread=on.is_cpu)
@@ -175,8 +207,7 @@ def load_meanwhile(
         architecture = on.get_cuda_compile_arch()
         missing = not_made(launches)
         first = None if architecture is None else tiles.builder(missing, architecture, workers)
-        done: concurrent.futures.Future[int] = concurrent.futures.Future()
-        AWAITED.add(done)
+        AWAITED.update(request.done for request in requests)
         GC_PAUSED.begin()
 
     def load_module(module: wp.Module, sizes: list[int]) -> None:
@@ -184,18 +215,20 @@ def load_meanwhile(
             wp.force_load(on, [module], block_dim=size, max_workers=1)
 
     def load_all() -> None:
+        failure: BaseException | None = None
         try:
             side_by_side(by_size, load_module, workers, first, in_turn=bool(missing))
-        except BaseException as failure:
-            done.set_exception(failure)
-        else:
-            done.set_result(sum(map(len, by_size.values())))
-        finally:
-            AWAITED.discard(done)
-            GC_PAUSED.end()
+        except BaseException as e:
+            failure = e
+        for request in requests:
+            if failure is None:
+                request.done.set_result(sum(map(len, by_size.values())))
+            else:
+                request.done.set_exception(failure)
+            AWAITED.discard(request.done)
+        GC_PAUSED.end()
 
     spawn(load_all, "ig2mj-kernels")
-    return done
 
 
 def wait_for_others() -> None:
@@ -212,6 +245,8 @@ def loaded(loading: concurrent.futures.Future[int], scene: str) -> int:
     Raises:
       EngineError: a module could not be compiled or loaded, or the process ends.
     """
+    if not loading.done():
+        TOGETHER.flush()  # it may wait for the end of a block of this thread
     try:
         return loading.result()
     except Exception as failure:
