@@ -9,7 +9,7 @@ from robot_world import RobotWorld
 from scipy.spatial.transform import Rotation
 
 from ig2mj.agents.fetch import Fetch
-from ig2mj.agents.fetch.figures import CHAIN, CHAIN_JOINTS, JOINTS, LOWER, UPPER, start_positions
+from ig2mj.agents.fetch.figures import CHAIN, CHAIN_JOINTS, JOINTS, LOWER, UPPER, WHEEL_RADIUS, start_positions
 from ig2mj.agents.kinematics import forward, inverse, solve_positive
 from ig2mj.errors import UnknownNameError
 from ig2mj.geometry.poses import rotation_angle
@@ -52,6 +52,25 @@ def test_masses_and_limits_are_the_makers():
     assert model.body_subtreemass[0] == pytest.approx(120.93, abs=0.01)
     assert model.joint("fetch_elbow_flex_joint").range == pytest.approx([-2.251, 2.251])
     assert model.actuator("fetch_shoulder_lift").forcerange == pytest.approx([-131.76, 131.76])
+
+
+def test_the_base_drives_onto_a_carpet_of_13_mm_from_before_its_edge():
+    spec = mujoco.MjSpec.from_string("<mujoco><option timestep='0.0025' gravity='0 0 -9.8'/></mujoco>")
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 1])
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[1, 1, 0.0065], pos=[1.21, 0, 0.0065])
+    Fetch().attach(spec)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    for _ in range(400):
+        mujoco.mj_step(model, data)
+    floor = float(data.body("fetch").xpos[2])
+    for side in "rl":
+        data.actuator(f"fetch_{side}_wheel").ctrl = 0.2 / WHEEL_RADIUS
+    for _ in range(1600):
+        mujoco.mj_step(model, data)
+    assert data.body("fetch").xpos == pytest.approx([0.8, 0.0, floor + 0.013], abs=0.12)
+    assert data.body("fetch").xpos[2] - floor == pytest.approx(0.013, abs=0.001)
 
 
 @pytest.mark.slow

@@ -55,6 +55,14 @@ RUSH, RUSHING = 0.2, 3.0
 """m in an agent step from which on a wheeled base drives as fast as it can, to take an edge of a carpet, and by how
 much its gain is greater then."""
 
+PASSING, CROSSING = 0.05, 0.8
+"""m, tolerance of a point from which on a base only passes it, and least command of driving to such a point as fast as
+it can: an edge of a carpet on the way stops what is slower."""
+
+RUSH_AHEAD, RUSH_TURN = 0.8, 0.15
+"""rad off its way up to which a base that drives so goes on, and its greatest command of turning meanwhile: where it
+slows down to turn, an edge stops it."""
+
 PRESSED, PRESSING = 0.2, 2
 """N with which a finger's link presses on what it holds, at least, and links that hold something by friction alone."""
 
@@ -133,7 +141,8 @@ class Body(Protocol):
     Attributes:
       size: n. friction: what its hands hold by friction alone; None: they hold by constraints. hands: numbers of its
         hands among all hands of the scene. grips: [H, 3] m, the point with which each hand takes hold, in its frame.
-      sideways: its base moves in any direction. stands: m, height of a body that hovers; else 0.
+      sideways: its base moves in any direction. stands: m, height of a body that hovers; else 0. climbs: it passes over
+        edges of carpets.
     """
 
     size: int
@@ -142,6 +151,7 @@ class Body(Protocol):
     grips: Float[np.ndarray, "H 3"]
     sideways: bool
     stands: float
+    climbs: bool
 
     def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
         """The controller's action of the present phases."""
@@ -238,6 +248,7 @@ class HandedBody(Body, Protocol):
 
 class _Body:
     stands = 0.0
+    climbs = False
     friction: FrictionHolds | None = None
 
     def __init__(self, scene: Scene, controller: Controller, agent: int):
@@ -262,6 +273,8 @@ class WheeledBody(_Body):
     hands stay as they are."""
 
     sideways = False
+    carrying = MOST, MOST
+    """Greatest commands of driving and turning while a hand holds something."""
 
     def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
         action = np.tile(self._rest, (len(senses.base_pos), 1))
@@ -275,10 +288,14 @@ class WheeledBody(_Body):
         heading = np.where(drives, way + np.pi * back, rows["yaw"])
         left = _wrapped(heading - senses.yaw)
         acts = rows["base"] != Base.STAY
-        action[:, turn] = np.where(acts, np.clip(GAIN * left, -MOST, MOST), 0.0)
-        ahead = drives & (np.abs(left) < AHEAD)
-        rushes = rows["speed"] >= RUSH
-        speed = np.clip(np.where(rushes, RUSHING, 1.0) * GAIN * apart, 0.0, np.where(rushes, 1.0, MOST)) * np.cos(left)
+        carries = senses.held.any(axis=(1, 2))
+        rushes = drives & (rows["speed"] >= RUSH) & ~carries
+        ahead = drives & (np.abs(left) < np.where(rushes, RUSH_AHEAD, AHEAD))
+        most = np.where(carries, self.carrying[1], np.where(rushes & ahead, RUSH_TURN, MOST))
+        action[:, turn] = np.where(acts, np.clip(GAIN * left, -most, most), 0.0)
+        least = np.where(rushes & (rows["tolerance"] > PASSING), CROSSING, 0.0)
+        speed = np.where(rushes, RUSHING, 1.0) * GAIN * apart
+        speed = np.clip(speed, least, np.where(carries, self.carrying[0], np.where(rushes, 1.0, MOST))) * np.cos(left)
         action[:, forward] = np.where(ahead, np.where(back, -speed, speed), 0.0)
         return action
 
@@ -292,7 +309,7 @@ class HoveringBody(_Body):
         narrow places.
     """
 
-    sideways = True
+    sideways = climbs = True
     away = 0.0
     trunk = (BODY_RADIUS + 0.01, 2 * BODY_HEIGHT)
     resting = (0.56, 0.8, 0.33)

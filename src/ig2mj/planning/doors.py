@@ -34,11 +34,11 @@ Action = Callable[[PlannedWorld, Step], Primitive]
 
 
 def through_doors(world: PlannedWorld, step: Step, action: Action) -> Primitive:
-    """A primitive; where shut doors are in its way they are opened, and it begins again. A base on wheels goes around
-    carpets, and over them where it fails otherwise."""
+    """A primitive; where shut doors are in its way they are opened, and it begins again. A base that climbs no
+    edges of carpets goes around them, and over them where it fails otherwise."""
     outcome = yield from _through_doors(world, step, action)
     blocked = outcome.reason in ("no_base", "no_path", "timeout")
-    if not blocked or world.body.sideways or not world.planner.occupancy.covered.any():
+    if not blocked or world.body.climbs or not world.planner.occupancy.covered.any():
         return outcome
     world.crosses = True
     return (yield from _through_doors(world, step, action))

@@ -29,6 +29,9 @@ NEAR = 1.0
 BACKS_OFF, RUN_UP = 0.3, 0.6
 """m that a base goes straight back where something has stopped it; on wheels, to take an edge of a carpet."""
 
+BACK_STEPS = 40
+"""Agent steps that this takes at most."""
+
 SLIGHT = 0.02
 """m of stretching and stooping that do not count."""
 
@@ -44,6 +47,9 @@ ASIDE = 0.05
 QUICK = 0.12
 """m in an agent step of a base whose hands are empty."""
 
+TURN_STEPS = 120
+"""Agent steps of a turn at the end of a way, at most: with something in the hand a base turns slowly."""
+
 AT_LEAST, SLOWEST = 100, 0.02
 """Agent steps that a stretch of the way may take at least, and m in an agent step of the slowest base: its limit."""
 
@@ -55,8 +61,8 @@ def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     if reason != "timeout":
         return reason
     here, yaw = world.base
-    x, y = here - (BACKS_OFF if world.body.sideways else RUN_UP) * np.array([np.cos(yaw), np.sin(yaw)])
-    yield [dataclasses.replace(shift(Stance((float(x), float(y)), yaw)), limit=20, after="")]
+    x, y = here - (BACKS_OFF if world.body.climbs else RUN_UP) * np.array([np.cos(yaw), np.sin(yaw)])
+    yield [dataclasses.replace(shift(Stance((float(x), float(y)), yaw)), limit=BACK_STEPS, after="")]
     return (yield from _go(world, stance))
 
 
@@ -198,7 +204,7 @@ def drive(points: np.ndarray, yaw: float | None, speed: float | None = None) -> 
     if program:
         program[-1] = dataclasses.replace(program[-1], tolerance=0.025)
     if yaw is not None:
-        program.append(Phase(Base.TURN, yaw=float(yaw), turn_tolerance=0.06, limit=60))
+        program.append(Phase(Base.TURN, yaw=float(yaw), turn_tolerance=0.06, limit=TURN_STEPS))
     return program
 
 

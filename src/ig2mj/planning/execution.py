@@ -30,6 +30,10 @@ STILL, STILL_TURNED, BLOCKED = 0.004, 0.02, 4
 """m and rad in an agent step below which a hand on an arm does not move, and steps of it after which the hand is
 blocked: a controller adds up what is asked of a blocked hand, and a hand that is far behind loses what it holds."""
 
+STANDS, STANDS_TURNED, STUCK = 0.008, 0.03, 20
+"""m and rad that a base on wheels has not moved in so many agent steps of a phase that moves it, if it is stuck: what
+has stopped it does so for the rest of the phase."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Carry:
@@ -39,7 +43,8 @@ class Carry:
       programs: of all worlds. phase: number of the present one. steps: agent steps in it. status: of each world.
       rows: the present phases. rise: m by which bodies are asked to be above their height.
       hand_pos, hand_quat: where hands were. still: agent steps of the present phase in which the acting one has not
-        moved.
+        moved. base: x, y and direction, m and rad, from which bases that are to move have not gone far in so many
+        agent steps of the present phase as `stood` says.
     """
 
     programs: Programs
@@ -51,6 +56,8 @@ class Carry:
     hand_pos: Float[np.ndarray, "W H 3"] | None
     hand_quat: Float[np.ndarray, "W H 4"] | None
     still: Int[np.ndarray, "W"]
+    base: Float[np.ndarray, "W 3"] | None
+    stood: Int[np.ndarray, "W"]
 
     @property
     def running(self) -> Bool[np.ndarray, "W"]:
@@ -68,7 +75,7 @@ def begin(programs: Sequence[Sequence[Phase]]) -> Carry:
     zero = np.zeros(len(programs), np.int32)
     status = np.where(packed.length > 0, RUNNING, DONE).astype(np.int32)
     rise = np.zeros(len(programs), np.float32)
-    return Carry(packed, zero, zero, status, packed.at(zero), rise, None, None, zero)
+    return Carry(packed, zero, zero, status, packed.at(zero), rise, None, None, zero, None, zero)
 
 
 def begin_some(carry: Carry, programs: Mapping[int, Sequence[Phase]]) -> Carry:
@@ -78,10 +85,15 @@ def begin_some(carry: Carry, programs: Mapping[int, Sequence[Phase]]) -> Carry:
     new = np.array(list(programs), np.int64)
     fresh = Programs.pack(list(programs.values()))
     packed = carry.programs.with_rows(new, fresh)
-    phase, steps, status, still = (a.copy() for a in (carry.phase, carry.steps, carry.status, carry.still))
-    phase[new], steps[new], still[new] = 0, 0, 0
+    counts = (carry.phase, carry.steps, carry.still, carry.stood)
+    phase, steps, still, stood = (a.copy() for a in counts)
+    status = carry.status.copy()
+    for count in (phase, steps, still, stood):
+        count[new] = 0
     status[new] = np.where(fresh.length > 0, RUNNING, DONE)
-    return Carry(packed, phase, steps, status, packed.at(phase), carry.rise, carry.hand_pos, carry.hand_quat, still)
+    return dataclasses.replace(
+        carry, programs=packed, phase=phase, steps=steps, status=status, rows=packed.at(phase), still=still, stood=stood
+    )
 
 
 def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Float[np.ndarray, "W n"], Carry]:
@@ -98,7 +110,9 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
         ends = (rows["until"] == Until.TOUCHED) | ((rows["until"] == Until.THERE) & (rows["after"] == 0))
         there |= ends & (rows["moves"] > 0) & (still >= BLOCKED)
     there &= carry.steps >= np.where(rows["close"] >= 0, SETTLING, 0)
-    late = carry.steps >= rows["limit"]
+    stands, base = _base_stands(body, carry, senses, rows)
+    stood = np.where(stands, carry.stood + 1, 0)
+    late = (carry.steps >= rows["limit"]) | (stood >= STUCK)
     waited = late & (rows["until"] == Until.WAITED)
     failed = np.where(lost, REASON_NUMBERS.index("slipped"), np.where(late & ~there & ~waited, rows["after"], 0))
     passed = there | waited | (late & (failed == 0))
@@ -109,9 +123,9 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     status = np.where(running & (failed > 0), failed, np.where(finished, DONE, carry.status))
     rows = carry.programs.at(phase) if forward.any() else rows
     rise = np.where(np.isnan(rows["rise"]), carry.rise, rows["rise"])
-    steps, still = np.where(forward, 0, carry.steps + 1), np.where(forward, 0, still)
+    steps, still, stood = (np.where(forward, 0, count) for count in (carry.steps + 1, still, stood))
     hands = senses.hand_pos, senses.hand_quat
-    new = Carry(carry.programs, phase, steps, status.astype(np.int32), rows, rise, *hands, still)
+    new = Carry(carry.programs, phase, steps, status.astype(np.int32), rows, rise, *hands, still, base, stood)
     going = new.running
     still = {**rows, "base": np.where(going, rows["base"], Base.STAY), "hand": np.where(going, rows["hand"], -1)}
     still["rise"] = rise
@@ -157,6 +171,19 @@ def _hand_is_still(carry: Carry, senses: Senses, rows: Rows) -> Bool[np.ndarray,
     moved = np.linalg.norm((senses.hand_pos - carry.hand_pos)[world, hand], axis=1)
     turned = np.asarray(rotation_angle(senses.hand_quat[world, hand], carry.hand_quat[world, hand]))
     return (rows["hand"] >= 0) & (moved < STILL) & (turned < STILL_TURNED)
+
+
+def _base_stands(
+    body: Body, carry: Carry, senses: Senses, rows: Rows
+) -> tuple[Bool[np.ndarray, "W"], Float[np.ndarray, "W 3"]]:
+    """Worlds in which a base on wheels is to move and is about where it was, and where that is."""
+    base = np.column_stack([senses.base_pos[:, :2], senses.yaw])
+    if carry.base is None or body.sideways:
+        return np.zeros(len(base), bool), base
+    moved = base - carry.base
+    turned = np.abs((moved[:, 2] + np.pi) % (2 * np.pi) - np.pi)
+    stands = (np.linalg.norm(moved[:, :2], axis=1) < STANDS) & (turned < STANDS_TURNED) & (rows["base"] != Base.STAY)
+    return stands, np.where(stands[:, None], carry.base, base)
 
 
 def _lost(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:

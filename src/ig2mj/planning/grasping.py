@@ -99,6 +99,8 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
             found = _plan(world, name, hand, tried, prefers)
         if found is None:
             reason, detail = "no_base", f"no free floor from which a hand has a way to {name}"
+            if not tried and world.body.opening is not None and not grasp_poses(world, name, world.obstacles([name])):
+                reason, detail = "no_grasp", f"the gripper fits around no part of {name} that it has room at"
             nowhere += 1
             continue
         nowhere = 0

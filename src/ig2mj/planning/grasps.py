@@ -159,7 +159,7 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     if body.opening is not None:
         others = set(range(len(tables.object_names))) - {index}
         own = world.planner.obstacles(world.view, others, world.world)
-        which, points = _between_fingers(own, points, fingers, palms, body.opening)
+        which, points = between_fingers(own, points, fingers, palms, body.opening)
         fingers, palms = fingers[which], palms[which]
     before = np.where(_room(body, obstacles, points, fingers, palms, 0.0, AT_OBJECT), 0.0, -1.0)
     for away in (*BEFORE, FLAT) if body.opening is None else BEFORE:
@@ -193,7 +193,7 @@ def _fingers_have_room(
     return np.all(distance > -GRAZE, axis=1)
 
 
-def _between_fingers(
+def between_fingers(
     own: Obstacles,
     points: Float[np.ndarray, "N 3"],
     fingers: Float[np.ndarray, "N 3"],

@@ -10,9 +10,9 @@ from collections.abc import Callable, Generator, Mapping
 
 import numpy as np
 
-from ig2mj.planning.clearance import hand_way
+from ig2mj.planning.clearance import Obstacles, hand_way
 from ig2mj.planning.driving import go
-from ig2mj.planning.grasps import AT_OBJECT
+from ig2mj.planning.grasps import AT_OBJECT, between_fingers
 from ig2mj.planning.joints import AJAR, OPEN_TO, FaceGrip, OpenableJoint, openable_joints
 from ig2mj.planning.moves import (
     ABOVE,
@@ -220,11 +220,13 @@ def withdraw(world: PlannedWorld, hand: int) -> Program:
 @dataclasses.dataclass(frozen=True, eq=False)
 class _JointPlan:
     """How a hand moves a joint: from where, and for each place on the way the point and the normal of the face that it
-    is at. pulls: it takes hold of the face; else it pushes it."""
+    is at. pulls: it takes hold of the face; else it pushes it. fingers: where they point or, of a gripper, from one to
+    the other."""
 
     stance: Stance
     places: list[FaceGrip]
     pulls: bool
+    fingers: Vector
 
 
 def _ways(
@@ -263,11 +265,18 @@ def _plan(
     floor, obstacles = world.floor(), world.obstacles()
     passed, ways, floats = 0, _ways(world, joint, value, to), world.body.opening is None
     steps = (1.0,) if floats else (1.0, ARM_SWING)
-    for step, (grips, end, pulls) in itertools.product(steps, ways):
+    others = set(range(len(world.domain.model.tables.object_names))) - {joint.object_index}
+    own = world.planner.obstacles(world.view, others, world.world)
+    for step, flat, (grips, end, pulls) in itertools.product(steps, (False,) if floats else (False, True), ways):
         fraction = min(end, joint.fraction + step) if value else max(end, joint.fraction - step)
         count, sweep = 0, joint.sweep(fraction)[:, :2]
+        pinches = pulls and joint.hinge and not floats and _is_held(world, joint)
         for grip in grips:
+            pinched = _pinched(own, grip, world.body.opening) if pinches else None
+            if flat != (pinches and pinched is None):  # fingers find nothing between them on a flat face
+                continue
             count = 0 if floats else count
+            grip, fingers = (grip, _fingers(joint, grip, pulls, hand)) if pinched is None else pinched
             places = joint.path(grip, fraction)
             first, normal = places[0]
             upright = grips is not joint.edges and float(np.linalg.norm(normal[:2])) > UPRIGHT
@@ -281,19 +290,35 @@ def _plan(
                 count += 1
                 if count > (WAYS if floats else ARM_WAYS):
                     break
-                spheres = world.spheres(_fingers(joint, places[0], pulls, hand), -normal)
+                spheres = world.spheres(fingers, -normal)
                 before = first + ABOVE * normal
                 back = [-ahead(stance.yaw), normal, UP]
-                quat = world.body.turned(hand, _fingers(joint, places[0], pulls, hand), -normal)
+                quat = world.body.turned(hand, fingers, -normal)
                 follows = world.follows(hand, quat, obstacles, stance)
                 way = hand_path(obstacles, spheres, world.resting(hand, stance), before, back, follows=follows)
                 if way is None or (follows is not None and not follows.passes([*way, *(p for p, _ in places)])):
                     continue
                 passed += 1
                 if passed > tried:
-                    return _JointPlan(stance, places, pulls)
+                    return _JointPlan(stance, places, pulls, fingers)
                 break  # the next grip
     return None
+
+
+def _pinched(own: Obstacles, grip: FaceGrip, opening: float) -> tuple[FaceGrip, Vector] | None:
+    """A grip with the link in the middle between the fingers of a gripper, and the direction from finger to finger;
+    None: there the link is too wide in any direction, as a flat face is.
+
+    Args:
+      own: the object alone. opening: m between the fingers.
+    """
+    point, normal = grip
+    level, up = np.cross(normal, UP), UP - (UP @ normal) * normal
+    across = [v / np.linalg.norm(v) for v in (level, up) if np.linalg.norm(v) > 0.3]
+    ways = np.array(across or np.eye(3)[:2])
+    count = len(ways)
+    which, moved = between_fingers(own, np.tile(point, (count, 1)), ways, np.tile(-normal, (count, 1)), opening)
+    return ((moved[0], normal), ways[which[0]]) if len(which) else None
 
 
 def _is_full(world: PlannedWorld, joint: OpenableJoint) -> bool:
@@ -317,7 +342,7 @@ def _fingers(joint: OpenableJoint, grip: FaceGrip, pulls: bool, hand: int) -> Ve
 def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointPlan) -> Program | None:
     places, index = plan.places, joint.object_index
     first, normal = places[0]
-    fingers = _fingers(joint, places[0], plan.pulls, hand)
+    fingers = plan.fingers
     quat = world.body.turned(hand, fingers, -normal)
     _, yaw = world.base
     before, back = first + ABOVE * normal, [-ahead(yaw), normal, UP]

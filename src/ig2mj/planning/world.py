@@ -291,7 +291,7 @@ class PlannedWorld:
                 offset = corners[:, :2] - here
                 away = float((np.abs(offset @ aside) if ahead else np.linalg.norm(offset, axis=1)).max())
                 footprint = footprint.holding(float(corners[:, 2].min()), float(corners[:, 2].max()), away)
-        if not self.body.sideways and not self.crosses:
+        if not self.body.climbs and not self.crosses:
             footprint = footprint.on_wheels()
         without = [*without, *(self.index(n) for n in held if n)]
         if view is not None:

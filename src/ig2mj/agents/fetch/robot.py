@@ -55,6 +55,11 @@ FINGER_REACH, FINGER_EDGE, FINGER_FACE = 0.03, 0.0115, 0.0155
 """m: corners of the fingers' inner faces in their frames, where rays run (iGibson's, on its own fingers: 0.04, 0.014
 and 0.012). Ours are 6 cm long, and the grasp point is in their middle, where the gripper's frame is."""
 
+SPRUNG, SPRING = 0.01, 20.0
+"""m by which springs press a wheel below where a rigid one would stand, and their stiffness in 1/s2 (MuJoCo's direct
+`solref`), critically damped: a base whose wheels and casters are rigid stands on its casters at the edge of a carpet of
+1 cm, its wheels without load. The robot itself drives over thresholds of 13 mm (ADA)."""
+
 LIFTED = 0.007
 """m: of a pinned base above its place, so that its wheels do not touch the floor."""
 
@@ -190,7 +195,9 @@ class Fetch(TaskRobot):
         number = JOINTS.index(joint)
         servo(spec, name, float(STIFFNESS[number]), float(DAMPING[number]), joint.effort, name=short)
         if wheel:
-            collision(body, GEOM.mjGEOM_SPHERE, (WHEEL_CONTACT,), friction=1.0)
+            collision(body, GEOM.mjGEOM_SPHERE, (WHEEL_CONTACT + SPRUNG * (not self.pinned),), friction=1.0)
+            if not self.pinned:
+                body.geoms[-1].solref, body.geoms[-1].priority = [-SPRING, -2 * SPRING**0.5], 1
         draw_link(body, joint.link, look)
         return body
 

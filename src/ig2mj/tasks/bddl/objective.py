@@ -34,12 +34,18 @@ class BddlObjective:
         """`objects`: that the activity is about. `goal`: of the same scene."""
         self._objects = np.array([scene.object_index(name) for name in objects], int)
         self._hands = np.flatnonzero(scene.tables.hand_agent == 0)
+        tables, model = scene.tables, scene.model
+        self._joints = np.flatnonzero(np.isin(tables.openable_object, self._objects))
+        self._shut = tables.openable_closed[self._joints].astype(np.float32)
+        self._range = (tables.openable_open - tables.openable_closed)[self._joints].astype(np.float32)
+        own = [int(np.flatnonzero(model.jnt_qposadr == a)[0]) for a in tables.openable_qposadr[self._joints]]
         pose = [*(f"pos_{a}" for a in "xyz"), *(f"quat_{a}" for a in "wxyz")]
         held = [f"in_hand_{k}" for k in range(len(self._hands))]
         self.vectors: dict[str, tuple[str, ...]] = {
             "privileged_state": (
                 *(f"{name}_{n}" for name in objects for n in pose),
                 *(f"{name}_{n}" for name in objects for n in held),
+                *(f"{model.joint(number).name}_open" for number in own),
                 *(f"holds_{k}" for k in range(len(goal.atoms))),
                 *("goal_progress", "time_left"),
             )
@@ -76,16 +82,18 @@ class BddlObjective:
         status: GoalStatus,
         time_left: Float[Array, "W"],
     ) -> dict[str, Float[Array, "W n"]]:
-        """`privileged_state`: poses of the objects in the frame of the robot's base, which hands hold them, which
-        literals of the goal are true."""
+        """`privileged_state`: poses of the objects in the frame of the robot's base, which hands hold them, how
+        far their doors, drawers and lids are open (0 to 1), which literals of the goal are true."""
         agent, worlds = view.agent, view.object_com.shape[0]
         base_pos, base_quat = jnp.asarray(agent.base_pos)[:, :1], jnp.asarray(agent.base_quat)[:, :1]
         com, quat = jnp.asarray(view.object_com)[:, self._objects], jnp.asarray(view.object_quat)[:, self._objects]
         place, turn = relative_pose(base_pos, base_quat, com, quat)
         held = jnp.asarray(view.held)[:, self._hands][:, :, self._objects].swapaxes(1, 2)
+        opened = (jnp.asarray(view.joint_pos)[:, self._joints] - self._shut) / self._range
         columns = [
             jnp.concatenate([place, turn], axis=-1).reshape(worlds, -1),
             held.reshape(worlds, -1).astype(jnp.float32),
+            opened.astype(jnp.float32),
             jnp.asarray(status.literals).astype(jnp.float32),
             now.share[:, None],
             time_left[:, None],
