@@ -34,6 +34,9 @@ STANDS, STANDS_TURNED, STUCK = 0.008, 0.03, 20
 """m and rad that a base on wheels has not moved in so many agent steps of a phase that moves it, if it is stuck: what
 has stopped it does so for the rest of the phase."""
 
+NEAR, TURNED_NEAR = 0.08, 0.2
+"""m and rad from the end of a phase within which a base creeps, and does not count as stuck."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Carry:
@@ -176,14 +179,23 @@ def _hand_is_still(carry: Carry, senses: Senses, rows: Rows) -> Bool[np.ndarray,
 def _base_stands(
     body: Body, carry: Carry, senses: Senses, rows: Rows
 ) -> tuple[Bool[np.ndarray, "W"], Float[np.ndarray, "W 3"]]:
-    """Worlds in which a base on wheels is to move and is about where it was, and where that is."""
+    """Worlds in which a base on wheels is to move far and is about where it was, and where that is."""
     base = np.column_stack([senses.base_pos[:, :2], senses.yaw])
     if carry.base is None or body.sideways:
         return np.zeros(len(base), bool), base
     moved = base - carry.base
     turned = np.abs((moved[:, 2] + np.pi) % (2 * np.pi) - np.pi)
-    stands = (np.linalg.norm(moved[:, :2], axis=1) < STANDS) & (turned < STANDS_TURNED) & (rows["base"] != Base.STAY)
+    stands = (np.linalg.norm(moved[:, :2], axis=1) < STANDS) & (turned < STANDS_TURNED)
+    stands &= _far(senses, rows)
     return stands, np.where(stands[:, None], carry.base, base)
+
+
+def _far(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
+    """Worlds in which the base is not near the goal of its phase, to which it creeps."""
+    apart = np.linalg.norm(rows["xy"] - senses.base_pos[:, :2], axis=1)
+    turned = np.abs((rows["yaw"] - senses.yaw + np.pi) % (2 * np.pi) - np.pi)
+    goes = (rows["base"] == Base.DRIVE) | (rows["base"] == Base.SHIFT)
+    return (goes & (apart > NEAR)) | ((rows["base"] == Base.TURN) & (turned > TURNED_NEAR))
 
 
 def _lost(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
