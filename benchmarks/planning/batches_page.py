@@ -3,6 +3,7 @@
     python -m benchmarks.planning.batches_page --batched FILE      takes in rows of `batched.py --out FILE`
     python -m benchmarks.planning.batches_page --policies FOLDER   takes in FOLDER/ALGORITHM/NAME.json
                                                                    (`ig2mj evaluate --json`) and NAME/progress.csv
+    python -m benchmarks.planning.batches_page --learned FILE      takes in rows of `primitive_policies.py --out FILE`
     python -m benchmarks.planning.batches_page                     writes the page from what was taken in before
 
 What is taken in is a line in benchmarks/results/planning/batched.jsonl for each activity, engine and number of worlds,
@@ -37,12 +38,14 @@ def main() -> None:
     )
     parser.add_argument("--batched", type=pathlib.Path, nargs="*", default=(), help="files of `batched.py --out`")
     parser.add_argument("--policies", type=pathlib.Path, nargs="*", default=(), help="folders of runs")
+    parser.add_argument("--learned", type=pathlib.Path, nargs="*", default=(), help="of `primitive_policies.py --out`")
     parser.add_argument("--results", type=pathlib.Path, default=FOLDER)
     parser.add_argument("--page", type=pathlib.Path, default=PAGE)
     args = parser.parse_args()
     rows = [row for file in args.batched for row in read_lines(file)]
     take_in(rows, args.results / BATCHED, lambda row: (row["activity"], row["engine"], row["worlds"]))
     found = [row for folder in args.policies for row in policies_of(folder)]
+    found += [row for file in args.learned for row in read_lines(file)]
     take_in(found, args.results / POLICIES, lambda row: (row["activity"], row["algorithm"]))
     kept = read_lines(args.results / BATCHED), read_lines(args.results / POLICIES)
     args.page.write_text(page(*kept), encoding="utf-8")
@@ -106,7 +109,13 @@ def page(batched: Sequence[Row], policies: Sequence[Row]) -> str:
     learned = [
         (row["activity"], row["algorithm"], str(row["episodes"]), f"{row['success_rate']:.0%} ({_interval(row)})",
          ", ".join(f"{float(p['held_out_loss']):.2f}" for p in row["curve"] if p.get("held_out_loss")) or "-")
-        for row in policies
+        for row in policies if "curve" in row
+    ]  # fmt: skip
+    chosen = [
+        (row["activity"], row["algorithm"].partition(",")[0], str(row["demonstrations"]), str(row["steps"]),
+         ", ".join(f"{a:.1%}" for a in row["agreement"]), str(row["episodes"]),
+         f"{row['success_rate']:.0%} ({_interval(row)})", f"{row['q']:.2f}", f"{row['primitives']:.1f}")
+        for row in policies if "agreement" in row
     ]  # fmt: skip
     commits = sorted({str(row["commit"]) for row in (*batched, *policies)})
     lines = [
@@ -126,7 +135,7 @@ def page(batched: Sequence[Row], policies: Sequence[Row]) -> str:
             *table(head, many),
             "",
         ]
-    if policies:
+    if learned:
         lines += [
             "## Policies",
             "",
@@ -136,6 +145,20 @@ def page(batched: Sequence[Row], policies: Sequence[Row]) -> str:
             *table(("activity", "algorithm", ">episodes", ">success", "held-out loss"), learned),
             "",
         ]
+    if chosen:
+        lines += [
+            "## Policies over primitives",
+            "",
+            "They see which facts hold and choose the next primitive (`action_space=\"primitives\"`). Learned from",
+            "the planner on the symbolic rung; played in physics, on held-out start states. *agreement*: with the",
+            "planner, in demonstrations that are not learned from, after each round of DAgger.",
+            "",
+            *table(
+                ("activity", "algorithm", ">demonstrations", ">steps", ">agreement", ">episodes", ">success", ">q",
+                 ">primitives of an episode"), chosen,
+            ),
+            "",
+        ]  # fmt: skip
     lines += [f"Commits: {', '.join(f'`{commit}`' for commit in commits)}." if commits else "No rows are taken in.", ""]
     return "\n".join(lines)
 

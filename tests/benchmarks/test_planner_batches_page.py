@@ -42,3 +42,23 @@ def test_policies_come_with_their_curves(tmp_path):
     run.with_suffix(".json").write_text(json.dumps(result), encoding="utf-8")
     (row,) = pages.policies_of(tmp_path)
     assert "| making_tea | bc | 32 | 50% (30% to 70%) | 0.50, 0.25 |" in pages.page([], [row])
+
+
+def test_policies_over_primitives_have_a_table_of_their_own():
+    row = {
+        "activity": "making_tea",
+        "algorithm": "bc, primitives",
+        "episodes": 20,
+        "success_rate": 0.9,
+        "success_low": 0.7,
+        "success_high": 0.97,
+        "q": 0.95,
+        "primitives": 5.25,
+        "demonstrations": 100,
+        "steps": 400,
+        "agreement": [0.98, 1.0],
+        "commit": "abc",
+    }
+    text = pages.page([], [row])
+    assert "| making_tea | bc | 100 | 400 | 98.0%, 100.0% | 20 | 90% (70% to 97%) | 0.95 | 5.2 |" in text
+    assert "held-out loss" not in text

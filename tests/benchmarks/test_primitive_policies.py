@@ -1,0 +1,24 @@
+"""Policies over primitives: the network learns a table, and the planner demonstrates what reaches the goal."""
+
+import numpy as np
+
+import ig2mj
+from benchmarks.planning.primitive_policies import Policy, demonstrations, labelled
+
+
+def test_the_network_learns_what_depends_on_two_facts_together():
+    facts = np.array([[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)], np.float32)
+    action = (facts[:, 0] + facts[:, 1]).astype(int) % 2 + 2 * facts[:, 2].astype(int)
+    policy = Policy.learned(facts, action, 4, seed=0)
+    assert [policy(row) for row in facts] == action.tolist()
+
+
+def test_a_policy_that_has_learned_the_planners_steps_reaches_the_goal():
+    env = ig2mj.make("goal/small_home (inside apple_0 fridge_0)", action_space="primitives", rung="symbolic")
+    steps = demonstrations(env, 2, seed=0)
+    facts, action, episode = steps.arrays()
+    names = [str(env.actions[k]) for k in action[episode == 0]]
+    assert names == ["open fridge_0", "grasp apple_0", "place_inside apple_0 fridge_0"]
+    policy = Policy.learned(facts, action, len(env.actions), seed=0)
+    seen = labelled(env, policy, 1, seed=5, first=2)
+    assert seen.action == action[episode == 0].tolist() and set(seen.episode) == {2}
