@@ -21,7 +21,8 @@ class StateOptions:
       drying_rate: droplets per second that a wet object loses. Beyond iGibson, where nothing ever dries; 0 is off.
       contact_heat_rate: 1/s, rate at which two touching objects with temperatures approach each other. Beyond
         iGibson, where heat passes from sources only; 0 is off.
-      soiling: what touches something that is covered with a substance is covered with it, too. Beyond iGibson.
+      soiling: what touches something that is covered with a substance is covered with it, too, and robots carry it
+        on under feet and wheels. Beyond iGibson.
       occlusion: `in_fov_of_agent` asks for an unobstructed line of sight, not only for the view frustum.
       image_aspect: width over height of the agent's camera image.
     """

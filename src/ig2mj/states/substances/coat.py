@@ -249,10 +249,12 @@ def _put(model: StateModel, states: ExtendedStates, field: str, obj: int, name: 
 def _initial(model: StateModel) -> dict[str, np.ndarray]:
     shape = (1, len(of(model).covered), len(of(model).names))
     dries = shape if model.options.drying_rate else (1, 0, 0)
+    robots = (1, len(model.tables.agent_names), shape[2]) if model.options.soiling else (1, 0, 0)
     return {
         "coat": np.zeros(shape, np.uint32),
         "absorbed": np.zeros(shape, np.float32),
         "drying": np.zeros(dries, np.float32),  # parts of the next point that dries
+        "tracked": np.zeros(robots, np.float32),  # points that robots still cover (`ig2mj.states.substances.tracks`)
     }
 
 
@@ -290,7 +292,12 @@ SPEC = StateSpec(
     get=_get,
     abilities=None,
     of_substances=True,
-    fields={"coat": UInt32[Array, "W D U"], "absorbed": Float[Array, "W D U"], "drying": Float[Array, "W Dd Ud"]},
+    fields={
+        "coat": UInt32[Array, "W D U"],
+        "absorbed": Float[Array, "W D U"],
+        "drying": Float[Array, "W Dd Ud"],
+        "tracked": Float[Array, "W Aa Ua"],
+    },
     initial=_initial,
     update=wipe,
     idle=wipes_nothing,

@@ -4,7 +4,8 @@
   rate doubles every `DOUBLES` degrees, as the vapour pressure of water does near room temperature. An object loses so
   much of what it has absorbed, and one covered point for each drop. Oil and paint stay.
 - Getting dirty: an object that touches a covered one is covered with the same at its points near covered ones. One of
-  the two must be loose. Cleaning tools neither give nor take.
+  the two must be loose. Cleaning tools neither give nor take. Robots carry on what they pass
+  (`ig2mj.states.substances.tracks`).
 
 Axes: W worlds, D objects that can be covered, N = 20 points, U substances, K pairs, O objects.
 """
@@ -21,7 +22,7 @@ from ig2mj.knowledge.substances import DRY, WATER
 from ig2mj.states.definitions.temperature import AMBIENT_TEMPERATURE
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep
-from ig2mj.states.substances import coat
+from ig2mj.states.substances import coat, tracks
 from ig2mj.states.substances.model import of
 
 DOUBLES, FASTEST = 10.0, 16.0
@@ -39,7 +40,7 @@ def is_on(model: StateModel) -> bool:
 def update(step: EventStep) -> EventStep:
     """One control step of both."""
     if step.model.options.soiling:
-        step = step.having(coat=_soiled(step))
+        step = tracks.update(step.having(coat=_soiled(step)))
     return _dried(step) if step.model.options.drying_rate else step
 
 
@@ -47,7 +48,7 @@ def idle(step: EventStep) -> Bool[Array, ""]:
     """Nothing is soiled; what can dry is not looked at."""
     if step.model.options.drying_rate:
         return jnp.array(False)
-    return ~jnp.any(_gives(step)) if step.model.options.soiling else jnp.array(True)
+    return ~jnp.any(_gives(step)) & tracks.idle(step) if step.model.options.soiling else jnp.array(True)
 
 
 def dries(model: StateModel) -> Bool[np.ndarray, "U"]:
