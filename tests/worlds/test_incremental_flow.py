@@ -73,3 +73,26 @@ def test_what_moves_elsewhere_leaves_the_steps_ahead_valid(monkeypatch):
     assert calls[len(elsewhere) - 1] <= 6 < len(elsewhere) / 3, "one call computes several steps"
     assert calls[len(elsewhere)] == calls[len(elsewhere) - 1] + 1, "the block is in the way: what was ahead is void"
     assert np.asarray(coat.covered(model, ours))[0, home.index["block"]].any()
+
+
+def test_contents_at_rest_are_asked_only_where_something_moves_that_they_depend_on(monkeypatch):
+    home = world(Item("block", (((0, 0, 0), (0.04, 0.04, 0.04)),), pos=(-2, -2, 0.04)))
+    model = home.model()
+    rules = Rules(model, compile_expression(model, "(contains glass water)"))
+    reference, stepper, asked = jax.jit(rules.step), IncrementalRules(rules, 1), []
+    idle = stepper._programs.idle
+    monkeypatch.setattr(stepper._programs, "idle", lambda *args: asked.append(args[2]) or idle(*args))
+    elsewhere = [({"block": (-2 + 0.01 * k, -2, 0.04)}, {}) for k in range(8)]
+    seen = [*elsewhere, ({"glass": (0.3, 0, 0.06)}, {}), ({}, POURS), *elsewhere]
+    ours = theirs = volume.set_volume(model, initial_states(model, 1), home.index["jug"], "water", 1.2)
+    counts = []
+    for k, (pos, more) in enumerate(seen):
+        view = jax.tree.map(np.asarray, home.view(pos, **more))
+        done, expected = stepper.step(ours, view), reference(theirs, view)
+        for a, b in zip(jax.tree.leaves(done.states), jax.tree.leaves(expected.states), strict=True):
+            np.testing.assert_array_equal(a, b, f"step {k}")
+        ours, theirs = done.states, expected.states
+        counts.append(asked.count(False))
+    assert counts[len(elsewhere) - 1] == counts[1], "while the block moves elsewhere nothing is asked of contents"
+    assert counts[len(elsewhere)] == counts[len(elsewhere) - 1] + 1, "the glass moves"
+    assert float(np.asarray(ours.volume)[0, 1].sum()) > 0, "the jug poured"

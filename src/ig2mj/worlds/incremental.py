@@ -5,7 +5,7 @@ control step runs MuJoCo and `Rules.step` in full. Results are the same to the b
 (`tests/worlds/test_incremental_is_the_plain_path.py`).
 
 The core calls `IncrementalRules.of(rules, engine).step(states, view) -> Outcome` where it calls `rules.step` on other
-engines, with the states and the view of each control step. Six facts decide what runs:
+engines, with the states and the view of each control step. Seven facts decide what runs:
 
 - All of a step is a pure function of the states and the view. Where both are those of the last step and the last step
   changed no state, its outcome is returned.
@@ -14,6 +14,8 @@ engines, with the states and the view of each control step. Six facts decide wha
 - Where something has moved, two small programs take the place of the first part: `states.update.idle` says whether it
   would change anything, `states.update.sources` which heat sources act. Each is called only where a field that it reads
   has changed. While sources act on the same objects, temperatures go on as before.
+- While nothing moves that contents and coats depend on, those that rested in the last step rest, and only ig2mj's own
+  states are asked.
 - Where the last step changed nothing but temperatures, contents of containers and coats, and ig2mj's own states are
   idle, one small program (`states.substances.flow_step`) takes the place of the first part. While nothing moves that
   these depend on, it computes several steps at a time.
@@ -38,7 +40,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Shaped
+from jaxtyping import Bool, Shaped
 
 from ig2mj.engine.base import Engine
 from ig2mj.engine.native.execution import HostFunction
@@ -50,6 +52,7 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
 from ig2mj.states.spec import StateSpec
 from ig2mj.states.substances import flow_step
+from ig2mj.states.substances.flow_reads import Reach, reach
 from ig2mj.states.update import can_be_idle, events, heat, heat_fields, heat_parts, idle, own_idle, queries, sources
 from ig2mj.states.world import ExtendedStates, Swap, with_fields
 from ig2mj.worlds.incremental_goal import AHEAD, GoalPrograms, IncrementalGoal, TemperatureSteps
@@ -155,7 +158,7 @@ class IncrementalRules:
         one. `before`: the view of the last step."""
         ahead, stands = self._flow_ahead, self._stands
         if not stands and ahead is not None and before is not None:
-            stands = not flow_step.depend_on_moves(self._programs.model, before, view, ahead.starts)
+            stands = not flow_step.depend_on_moves(self._programs.model, before, view, ahead.streams)
         if not stands or ahead is None or self._flow_over >= ahead.steps:
             ahead = self._programs.flow(self._leaves, view, flow_step.AHEAD if stands else 1)
             self._flow_ahead, self._flow_over = ahead, 0
@@ -190,6 +193,8 @@ class IncrementalRules:
         programs, before, own = self._programs, self._view, self._flows
         if not programs.tells_idle or before is None:
             return False
+        if not own and programs.can_flow:  # what rested goes on so while nothing moves that it depends on
+            own = not flow_step.depend_on_moves(programs.model, before, view, None)
         fingers, others = programs.idle_reads(self._leaves, view, own)
         same = _are_equal(view, before, others) and (not fingers or self._are_fingers_away(view))
         if not same and not programs.idle(self._leaves, view, own):
@@ -226,15 +231,14 @@ class FlowSteps(NamedTuple):
 
     Attributes:
       made: leaves of the states that these are, after each step. steps: how many were asked for. complete: how many are
-        those of a whole step. changes: whether each changes something. starts: where streams begin, m; NaN: there is
-        none.
+        those of a whole step. changes: whether each changes something. streams: where these are.
     """
 
     made: list[Shaped[Array, "N W ..."]]
     steps: int
     complete: int
     changes: list[int]
-    starts: Float[np.ndarray, "W K 3"]
+    streams: Reach
 
 
 class _Step(NamedTuple):
@@ -261,7 +265,8 @@ class _StatePrograms:
       structure: of the states, as a pytree. heat_places, heat_names: of the leaves that the second part changes, their
         places among the states' and the names of their fields. flow_places: places of
         `flow_step.FIELDS`. fingers_matter: also where they are out of reach of buttons. tells_idle: `idle` is of use.
-        late_reads: fields that the second part changes and the first reads.
+        late_reads: fields that the second part changes and the first reads. can_flow: there are steps of contents alone
+        (`flow_step.possible`).
     """
 
     def __init__(self, model: StateModel, num_worlds: int):
@@ -281,7 +286,7 @@ class _StatePrograms:
         self._idle, self._acts = HostFunction(self._idle_fn), HostFunction(self._acts_fn)
         self._own_idle, self._flow = HostFunction(self._own_idle_fn), HostFunction(self._flow_fn)
         self.flow_places = [names.index(name) for name in flow_step.FIELDS] if set(names) >= FLOW_FIELDS else []
-        self._names, self._can_flow = names, flow_step.possible(model)
+        self._names, self.can_flow = names, flow_step.possible(model)
         self._with_count = jax.tree.structure((0, [0] * len(names), 0))
         self._none_act = np.zeros((num_worlds, model.tables.num_objects, len(model.parameters.heat_object)), bool)
         self._of_view_and_states = jax.tree.structure((0, [0] * len(names)))
@@ -307,7 +312,7 @@ class _StatePrograms:
         for place, leaf in zip(self._changed, made, strict=True):
             leaves[place] = leaf
         quiet, flows, settled, swapped = flags.tolist()
-        flows = flows and not quiet and self._can_flow
+        flows = flows and not quiet and self.can_flow
         return _Step(leaves, Swap(*swap) if swapped else None, acts, quiet, flows, settled and (quiet or flows))
 
     def idle_reads(self, leaves: list[Array], view: PhysicsView, own: bool) -> tuple[bool, list[str]]:
@@ -327,7 +332,7 @@ class _StatePrograms:
         """The next steps of contents and coats."""
         made, flags, starts = self._flow.flat([view, *leaves, np.int32(steps)], self._with_count)
         count, *changes = flags.tolist()
-        return FlowSteps(made, steps, count, changes, np.asarray(starts))
+        return FlowSteps(made, steps, count, changes, reach(np.asarray(starts)))
 
     def changed(self, states: ExtendedStates, fields: dict[str, Array], leaves: list[Array]) -> ExtendedStates:
         """The states with new values of some fields. `leaves`: all of them."""

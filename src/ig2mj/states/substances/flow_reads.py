@@ -30,11 +30,12 @@ class _Reads(NamedTuple):
     """What steps of contents depend on.
 
     Attributes:
-      objects: on these. links: on forces at these, which are of cleaning tools. knows: False: on more than can be said.
+      objects: on these. is_read: whether each body is of one of them. links: on forces at these, which are of cleaning
+        tools. knows: False: on more than can be said.
     """
 
     objects: Int[np.ndarray, "N"]
-    is_read: Bool[np.ndarray, "O"]
+    is_read: Bool[np.ndarray, "B"]
     links: Int[np.ndarray, "L"]
     knows: bool
 
@@ -49,30 +50,47 @@ def _reads(model: StateModel) -> _Reads:
     own[found.things.object] = True
     links = np.unique(p.tool_link[p.tool_link >= 0])
     slicers = tables.link_object[tables.link_kind == LinkKind.SLICER]
-    return _Reads(np.flatnonzero(own), own, links, not (len(found.things.object) and len(slicers)))
+    of_bodies = np.append(own, False)[tables.body_object]  # the last: of no object
+    return _Reads(np.flatnonzero(own), of_bodies, links, not (len(found.things.object) and len(slicers)))
 
 
-def depend_on_moves(
-    model: StateModel, before: PhysicsView, view: PhysicsView, starts: Float[np.ndarray, "W K 3"]
-) -> bool:
+class Reach(NamedTuple):
+    """Boxes that hold streams, m, world frame: low and high corners. Of no stream, a box that nothing is in."""
+
+    low: Float[np.ndarray, "W K 1 3"]
+    high: Float[np.ndarray, "W K 1 3"]
+
+
+def reach(starts: Float[np.ndarray, "W K 3"]) -> Reach:
+    """Boxes of the streams that begin at these places, m, world frame; NaN: there is none."""
+    start = starts[:, :, None]
+    there = ~np.isnan(start)
+    return Reach(np.where(there, start - BELOW, np.inf), np.where(there, start + AROUND, -np.inf))
+
+
+def depend_on_moves(model: StateModel, before: PhysicsView, view: PhysicsView, streams: Reach | None) -> bool:
     """Whether what has moved between two views, `before` and `view`, can change steps of contents.
 
     Args:
-      starts: where the streams begin, m, world frame; NaN: there is none.
+      streams: where there are streams; None: there are none.
     """
     reads = _reads(model)
     if not reads.knows:
         return True
-    some = _moved(before, view, model.tables.body_object)
-    if reads.is_read[some].any() or _touches_differ(model, reads, before, view):
+    owner = model.tables.body_object
+    bodies = _moved(before, view, len(owner))
+    if reads.is_read[bodies].any() or _touches_differ(model, reads, before, view):
         return True
-    if not len(some):
+    if streams is None or not len(bodies):
         return False
-    low = np.minimum(*(np.asarray(v.aabb_low)[:, None, some] for v in (before, view)))
-    high = np.maximum(*(np.asarray(v.aabb_high)[:, None, some] for v in (before, view)))
-    start = starts[:, :, None]
-    apart = (start + AROUND < low) | (start - BELOW > high)
-    return bool((~(apart[..., 0] | apart[..., 1] | apart[..., 2] | np.isnan(start[..., 0]))).any())
+    objects = np.unique(owner[bodies])
+    return any(_meets(streams, v, objects[objects >= 0]) for v in (before, view))
+
+
+def _meets(streams: Reach, view: PhysicsView, objects: Int[np.ndarray, "N"]) -> bool:
+    low, high = (np.asarray(a).take(objects, 1)[:, None] for a in (view.aabb_low, view.aabb_high))
+    near = (low <= streams.high) & (high >= streams.low)
+    return bool(np.count_nonzero(np.logical_and.reduce(near, axis=-1)))
 
 
 AROUND = np.array([float(ASIDE.max()) + SLACK] * 2 + [SLACK], np.float32)
@@ -80,14 +98,14 @@ BELOW = np.array([float(ASIDE.max()) + SLACK] * 2 + [FALL + SLACK], np.float32)
 """m from where a stream begins, along and against the axes, to the ends of a box that holds all of it."""
 
 
-def _moved(before: PhysicsView, view: PhysicsView, owner: Int[np.ndarray, "B"]) -> Int[np.ndarray, "N"]:
-    """Objects of which a body has another pose."""
+def _moved(before: PhysicsView, view: PhysicsView, count: int) -> Int[np.ndarray, "n"]:
+    """Bodies that have another pose, of so many, some of them more than once."""
     found = []
-    for name in ("body_pos", "body_quat"):
-        one, other = np.asarray(getattr(before, name)), np.asarray(getattr(view, name))
-        found.append(np.flatnonzero(one != other) // one.shape[-1])
-    objects = owner[np.concatenate(found) % len(owner)]
-    return np.unique(objects[objects >= 0])
+    for name, width in (("body_pos", 3), ("body_quat", 4)):
+        differs = np.flatnonzero(np.asarray(getattr(before, name)) != np.asarray(getattr(view, name)))
+        found.append(differs // width)
+    moved = np.concatenate(found)
+    return moved if len(before.body_pos) == 1 else moved % count
 
 
 def _touches_differ(model: StateModel, reads: _Reads, before: PhysicsView, view: PhysicsView) -> bool:
