@@ -3,12 +3,15 @@
     python -m benchmarks.speed.rays [--task NAME] [--worlds 1024] [--looks day] [--rows FILE] [--variants NAME ...]
 
 One GPU. Start states of a task's home; the robot's eye, 128 x 128, RGB and depth, once a call, from the same worlds
-each time. Variants are timed in turns, `--rounds` times, next to the ray caster as it is (`base`):
+each time. Variants are timed in turns, `--rounds` times, next to the ray caster as it is (`base`). The calls of a round
+follow each other without waiting, as in a training: what the host does for a call is not counted unless the GPU waits
+for it.
 
 - `slots`, `poses`, `refit`, `depth`: parts of `base`: which particles are shown; that and where everything is; that
   and the boxes of what moves; images without colour.
 - `leaf_N`: triangles in a leaf of the trees of merged meshes. `cubql`, `median`: how these trees are built.
 - `block_N`: threads of a block; a tile of 64 rays is one or several of them.
+- `registers_N`: the most registers of a thread; 0: as many as the compiler chooses.
 - `size_N`: images of other sizes. `cameras_N`: the eye and N - 1 of the robot's other cameras.
 
 `differs`: share of pixels that differ from `base` by more than 1 of 255 in a channel; `most`: the largest difference.
@@ -34,7 +37,7 @@ from benchmarks.harness.kernel_times import profiled
 from benchmarks.harness.results import keep_row, machine
 from benchmarks.speed.batch import device
 from ig2mj.scene.scene import LOOKS
-from ig2mj.sensors import ray_caster
+from ig2mj.sensors import ray_caster, shading
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.sensors.particle_slots import fill_slots
 from ig2mj.worlds.draw import Draw
@@ -42,6 +45,7 @@ from ig2mj.worlds.draw import Draw
 VARIANTS = (
     *("base", "slots", "poses", "refit", "depth", "leaf_1", "leaf_4", "leaf_8", "cubql", "median"),
     *("block_32", "block_128", "block_256", "size_64", "size_224", "cameras_3"),
+    *("registers_0", "registers_64", "registers_80", "registers_96", "registers_128"),
 )
 
 PARTS = ("slots", "poses", "refit")
@@ -50,16 +54,18 @@ PARTS = ("slots", "poses", "refit")
 
 @contextlib.contextmanager
 def built(variant: str) -> Iterator[None]:
-    """Trees of merged meshes are built as the variant says."""
-    before = ray_caster.LEAF, ray_caster.CONSTRUCTOR
+    """Trees of merged meshes and the kernel are built as the variant says."""
+    before = ray_caster.LEAF, ray_caster.CONSTRUCTOR, shading.REGISTERS
     if variant.startswith("leaf_"):
         ray_caster.LEAF = int(variant[5:])
     if variant in ("cubql", "median"):
         ray_caster.CONSTRUCTOR = variant
+    if variant.startswith("registers_"):
+        shading.REGISTERS = int(variant[10:]) or None
     try:
         yield
     finally:
-        ray_caster.LEAF, ray_caster.CONSTRUCTOR = before
+        ray_caster.LEAF, ray_caster.CONSTRUCTOR, shading.REGISTERS = before
 
 
 def camera_of(env: Any, variant: str, looks: str) -> BatchCamera:
@@ -84,7 +90,7 @@ def camera_of(env: Any, variant: str, looks: str) -> BatchCamera:
 
 
 def program_of(camera: BatchCamera, variant: str, world: Any) -> Callable[[], Any]:
-    """One call of the variant, compiled; its arguments stay on the device."""
+    """One call of the variant, compiled, which does not wait for its end; its arguments stay on the device."""
     if variant in PARTS:
 
         def part(physics: Any, view: Any, states: Any) -> Any:
@@ -99,7 +105,7 @@ def program_of(camera: BatchCamera, variant: str, world: Any) -> Callable[[], An
         act = jax.jit(part)
     else:
         act = jax.jit(lambda physics, view, states: (lambda i: (i.rgb, i.depth))(camera(physics, view, states)))
-    return lambda: jax.block_until_ready(act(world.physics, world.view, world.states))
+    return lambda: act(world.physics, world.view, world.states)
 
 
 def compared(images: Any, base: Any) -> dict[str, float]:
@@ -132,13 +138,14 @@ def main(argv: Sequence[str] | None = None) -> None:
             print(f"{variant}: {type(failure).__name__}: {str(failure).splitlines()[0][:200]}", flush=True)
             continue
         programs[variant] = program
-        program()
+        jax.block_until_ready(program())
     spent: dict[str, list[float]] = {variant: [] for variant in programs}
     for _ in range(args.rounds):
         for variant, program in programs.items():
             began = time.perf_counter()
-            for _ in range(args.calls):
+            for _ in range(args.calls - 1):
                 program()
+            jax.block_until_ready(program())
             spent[variant].append((time.perf_counter() - began) / args.calls)
     for variant, seconds in spent.items():
         count = args.worlds * (int(variant[8:]) if variant.startswith("cameras_") else 1)

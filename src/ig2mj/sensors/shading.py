@@ -38,6 +38,15 @@ SHINE = (
 )
 """Parts of its lines, and what stands in their place: highlights are not limited by a texture."""
 
+KNOWN_SHADOWS = ("        use_shadows,\n", '        wp.static(rc_static["use_shadows"]),\n')
+"""Whether shadows are cast is compiled into the kernel. Otherwise it has the code of a shadow ray for every light."""
+
+REGISTERS: int | None = None
+"""The most registers of a thread of the kernel, in CUDA. With fewer, a multiprocessor holds more threads, which hide
+each other's reads of the trees, but each moves more of its values to memory. None: as many as the compiler chooses."""
+
+_DECORATOR = 'module_options={"fast_math": rc.use_fast_math})'
+
 _AT_CAMERA = '    if wp.static(rc_static["headlight_active"]):\n      cam_pos = ray_origin_world\n'
 
 _FALLS = 'max(*rc_static["headlight_diffuse"], *rc_static["headlight_specular"]) > 0.0'
@@ -84,5 +93,10 @@ def limit_light(
     for old, new in (*((line, line + more) for line, more in LIGHT), *SHINE, *NO_HEADLIGHT, *changes):
         assert text.count(old) == 1, f"MuJoCo Warp's kernel has changed: {old}"
         text = text.replace(old, new)
+    assert text.count(KNOWN_SHADOWS[0]) == 2, "MuJoCo Warp's kernel has changed: shadows"
+    text = text.replace(*KNOWN_SHADOWS)
+    if REGISTERS is not None:
+        assert text.count(_DECORATOR) == 1, "MuJoCo Warp's kernel has changed: its options"
+        text = text.replace(_DECORATOR, f"{_DECORATOR[:-1]}, cuda_max_registers={REGISTERS})")
     own = defined(build.__name__, text, {**build.__globals__, "_make_cast_ray": make_cast_ray})
     context._megakernel = own(types.SimpleNamespace(nlight=lights), context)
