@@ -1,9 +1,11 @@
 """Where a cleaning tool goes to take a particle off, and what its box covers there."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from ig2mj.planning.cleaning_strokes import PRESSED, Region, Stroke, one_after_another, turn_about
+from ig2mj.planning.cleaning_strokes import PRESSED, HeldTool, Region, Stroke, one_after_another, regions_of, turn_about
 from ig2mj.planning.world import DirtSpot
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -38,3 +40,16 @@ def test_upper_sides_come_first_and_then_the_nearest():
     side = DirtSpot(3, np.array([0.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.0]))
     strokes = [Stroke(s, 0, [s]) for s in (side, *spots)]
     assert [s.spot.number for s in one_after_another(strokes)] == [0, 2, 1, 3]
+
+
+def test_a_gripper_turns_its_tool_about_the_face_until_it_points_away_from_the_robot():
+    ahead, out = np.array([1.0, 0.0, -1.0]) / np.sqrt(2), np.array([1.0, 0.0, 1.0]) / np.sqrt(2)
+    held = HeldTool.__new__(HeldTool)
+    held.hand, held.has_area, held.out, held.corners = 0, True, out, np.eye(3)
+    axes = lambda hand: (np.array([0.0, 1.0, 0.0]), ahead)  # noqa: E731
+    held.world = SimpleNamespace(body=SimpleNamespace(opening=0.1), base=(np.zeros(2), 0.0), hand_axes=axes)
+    regions = regions_of(held, 0.0, np.array([0.0, 0.0, 1.0]))
+    first = regions[0].rotation
+    assert first @ out == pytest.approx([0.0, 0.0, -1.0], abs=1e-6)
+    assert first @ ahead == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
+    assert all((r.rotation @ ahead)[0] > -0.5 for r in regions)

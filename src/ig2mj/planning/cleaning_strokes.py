@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.planning.cleaning_area import cleaning_area
 from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.grasps import OBLIQUE
 from ig2mj.planning.moves import UP, ahead, hand_path
 from ig2mj.planning.stances import stances
 from ig2mj.planning.world import DirtSpot, PlannedWorld, Rotation, Stance, Vector
@@ -29,6 +30,10 @@ outside of its box."""
 
 TURNS = (np.pi / 2, -np.pi / 2, np.pi)
 """rad about a face's normal by which a tool is turned where it has no room otherwise."""
+
+BACKWARDS, ARM_TURNS = -0.2, 6
+"""Cosine of the angle between where a gripper on an arm points and where it likes to, below which it does not clean;
+and turns of its tool that are tried at most."""
 
 TILTS = (-0.8, 0.8)
 """rad about an axis in a face by which a tool is tilted."""
@@ -111,7 +116,7 @@ def regions_of(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
     facing = turn_onto(carried @ held.out, -normal) @ carried if held.has_area else carried
     rotations = [facing, carried] if held.has_area else [facing]
     if world.body.opening is not None:
-        return [Region.turned(r, points) for r in rotations]
+        return [Region.turned(r, points) for r in _of_arm(held, yaw, normal, facing, carried)]
     rotations += [turn_about(normal, angle) @ facing for angle in TURNS]
     across = np.cross(normal, UP) if abs(normal[2]) < 0.9 else np.array([-np.sin(yaw), np.cos(yaw), 0.0])
     across = across / np.linalg.norm(across)
@@ -119,6 +124,18 @@ def regions_of(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
     rotations += [tilt @ facing for tilt in tilts] + [tilt @ turn_about(normal, np.pi / 2) @ facing for tilt in tilts]
     found = [Region.turned(r, points) for r in rotations]
     return found + [dataclasses.replace(r, lifted=CLOSE) for r in found]
+
+
+def _of_arm(held: HeldTool, yaw: float, normal: Vector, facing: Rotation, carried: Rotation) -> list[Rotation]:
+    """Turns of a tool on an arm: about the normal, and of one that cleans with all of it also with the gripper towards
+    the face; those first in which the gripper points about where it likes to."""
+    _, palm = held.world.hand_axes(held.hand)
+    bases = [facing] if held.has_area else [facing, turn_onto(carried @ palm, -normal) @ carried]
+    found = [turn_about(normal, k * np.pi / 4) @ base for base in bases for k in range(8)] + [carried]
+    aim = OBLIQUE[0] * ahead(yaw) - OBLIQUE[1] * UP
+    score = [round(float(r @ palm @ aim), 1) for r in found]
+    order = sorted(range(len(found)), key=lambda k: -score[k])
+    return [found[k] for k in order if score[k] > BACKWARDS][:ARM_TURNS] or [facing]
 
 
 def turn_about(axis: Vector, angle: float) -> Rotation:
@@ -266,11 +283,28 @@ class _From:
                 room = left & (np.linalg.norm(at - shoulder, axis=1) <= self._world.body.reach)
                 rows = np.flatnonzero(room)
                 room[rows] = self._obstacles.clear_at(spheres, at[rows] + region.lifted * normal[rows])
+                if (
+                    self._world.body.opening is not None
+                    and room.any()
+                    and not self._arm_reaches(spots, members, room, turn)
+                ):
+                    continue
                 for row in np.flatnonzero(room & ~to_robot):
                     room[row] = bool(self.way(spots[members[row]], turn))
                 found[np.array(members)[room]] = turn
                 left &= ~room
         return found
+
+    def _arm_reaches(
+        self, spots: Sequence[DirtSpot], members: Sequence[int], room: Bool[np.ndarray, "n"], turn: int
+    ) -> bool:
+        """Whether an arm brings the tool, turned so, to above the middle one of some particles with room."""
+        rows = np.flatnonzero(room)
+        spot = spots[members[rows[len(rows) // 2]]]
+        region, _ = self._turned(spot.normal)[turn]
+        quat = self._world.turned_hand(self._hand, region.rotation)
+        follows = self._world.follows(self._hand, quat, self._obstacles, self._stance)
+        return follows is None or follows.reaches(region.above(spot))
 
     def way(self, spot: DirtSpot, turn: int) -> list[Vector] | None:
         """The hand's way to above a particle; None: there is none."""

@@ -236,7 +236,7 @@ def _ways(
     outer face or its edge, and pushed shut by its outer face. Where no floor is free before that, it is pulled by its
     edge until it is nearly shut, or by its inner face until it is ajar; a door between rooms, until it is shut. A lid
     or flap, which hands do not take hold of, is lifted by fingers below its edge, and pushed where it is ajar."""
-    between_rooms = world.domain.model.tables.object_categories[joint.object_index] == "door"
+    between_rooms = _is_between_rooms(world, joint)
     if value and _is_held(world, joint):
         return [(joint.grips, to, True), (joint.edges, to, True), (joint.inner_grips, to, False)]
     if value:
@@ -252,6 +252,11 @@ def _ways(
     elif joint.hinge and joint.fraction > AJAR + 0.1:
         ways.append((joint.inner_grips, AJAR, True))
     return [*ways, (joint.grips, 0.0, True)]
+
+
+def _is_between_rooms(world: PlannedWorld, joint: OpenableJoint) -> bool:
+    """Whether a joint is that of a door between rooms."""
+    return world.domain.model.tables.object_categories[joint.object_index] == "door"
 
 
 def _is_held(world: PlannedWorld, joint: OpenableJoint) -> bool:
@@ -273,8 +278,8 @@ def _plan(
         pinches = pulls and joint.hinge and not floats and _is_held(world, joint)
         for grip in grips:
             pinched = _pinched(own, grip, world.body.opening) if pinches else None
-            if flat != (pinches and pinched is None):  # fingers find nothing between them on a flat face
-                continue
+            if flat != (pinches and pinched is None) or (flat and _is_between_rooms(world, joint)):
+                continue  # fingers find nothing between them on a flat face, as a leaf has; handles may be there
             count = 0 if floats else count
             grip, fingers = (grip, _fingers(joint, grip, pulls, hand)) if pinched is None else pinched
             places = joint.path(grip, fraction)
@@ -301,7 +306,8 @@ def _plan(
                 passed += 1
                 if passed > tried:
                     return _JointPlan(stance, places, pulls, fingers)
-                break  # the next grip
+                if pinched is None:
+                    break  # the next grip; what fits between fingers is tried from other places
     return None
 
 
