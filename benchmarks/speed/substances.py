@@ -6,8 +6,8 @@
     python -m benchmarks.speed.substances trace --folder FOLDER [--case substances] [--worlds 4096] [--engine warp]
 
 `native`: microseconds of the states of one control step of birch on the native engine: without substances, with 16
-containers and 6 substances where nothing flows, and where a quarter of the containers overflow; at rest, while one
-loose object moves elsewhere, and while all objects move. `batch`: seconds of
+containers and 6 substances where nothing flows, and where a quarter of the containers overflow; while nothing moves,
+while one loose object moves elsewhere, and while all objects move. `batch`: seconds of
 rollouts of birch without substances, with them, and with 64 transition rules besides; a quarter of the containers of
 each world overflow. `pour`: worlds in which a litre is poured from a jug into a glass of 0.3 litres; the largest
 relative change of the sum over jug, glass and what was lost, and how far the engine is from the native one. `trace`:
@@ -82,6 +82,8 @@ def native(seconds: float = 3.0) -> None:
         ("without, one moves", (), False, "one"),
         ("without, all move", (), False, "all"),
         ("at rest", SUBSTANCES, False, ""),
+        ("at rest, one moves", SUBSTANCES, False, "one"),
+        ("at rest, all move", SUBSTANCES, False, "all"),
         ("flows", SUBSTANCES, True, ""),
         ("flows, one moves", SUBSTANCES, True, "one"),
         ("flows, all move", SUBSTANCES, True, "all"),
