@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -210,6 +210,21 @@ INDEX = {
 
 NO_OBJECT = ("room", "substance")
 """Roles of arguments that no object, and so no half, can have."""
+
+
+def names_of_objects(atoms: Iterable[Atom]) -> list[str]:
+    """Names that stand where predicates take objects, in their order, each once; without variables of quantifiers.
+
+    Raises:
+      UnknownNameError: there is no such predicate.
+    """
+    found = [
+        name
+        for atom in atoms
+        for name, role in zip(atom.arguments, find(atom.predicate).arguments, strict=False)
+        if role not in NO_OBJECT and not name.startswith("?")
+    ]
+    return list(dict.fromkeys(found))
 
 
 def _variants(model: StateModel, literal: Literal) -> list[tuple[int, ...]]:

@@ -12,6 +12,7 @@ import os
 import re
 
 from ig2mj.predicates import logic
+from ig2mj.predicates.literals import names_of_objects
 from ig2mj.predicates.parse import parse
 from ig2mj.scene.paths import scene_folder
 from ig2mj.tasks.task import Acts, Task, Weights
@@ -41,7 +42,6 @@ def goal_task(home: str | os.PathLike, goal: str) -> Task:
     """
     scene_folder(home)
     goal = " ".join(goal.split())
-    named = [argument for atom in logic.atoms(parse(goal)) for argument in atom.arguments]
     acts = Acts(None, hands=(0, 1), weights=Weights(share=True))
     return Task(
         name=f"{PREFIX}{os.fspath(home)} {goal}",
@@ -51,7 +51,7 @@ def goal_task(home: str | os.PathLike, goal: str) -> Task:
         start=(),
         near=(),
         goal=goal,
-        objects_of_interest=tuple(dict.fromkeys(name for name in named if not name.startswith("?"))),
+        objects_of_interest=tuple(names_of_objects(logic.atoms(parse(goal)))),
         distances=(),
         robots={"humanoid": acts},
         horizon=HORIZON,

@@ -34,6 +34,7 @@ import numpy as np
 from ig2mj.agents.registry import is_robot_folder, make_robot
 from ig2mj.errors import InputError, UnknownNameError
 from ig2mj.predicates import logic
+from ig2mj.predicates.literals import names_of_objects
 from ig2mj.predicates.parse import parse
 from ig2mj.scene.paths import MANIFEST_FILE, scene_folder
 from ig2mj.tasks.added_objects import with_objects
@@ -269,7 +270,7 @@ def _new(own: CustomTask, code: TaskCode) -> Task:
         raise InputError(where, "has neither a goal nor a method `success`", element=code.name, fix=fix)
     fields = {name: _checked(own, code, name, kind) for name, kind in _KINDS.items()}
     with blamed(code, "goal"):
-        named = _named_in(own.goal) if own.goal else []
+        named = names_of_objects(logic.atoms(parse(own.goal))) if own.goal else []
     task = Task(
         name=code.name,
         summary=_summary(own),
@@ -375,12 +376,6 @@ def _checked(own: CustomTask, code: TaskCode, name: str, kind: type) -> Any:
 def _summary(own: CustomTask) -> str:
     doc = (type(own).__doc__ or "").strip()
     return doc.splitlines()[0] if doc else ""
-
-
-def _named_in(goal: str) -> list[str]:
-    """Names in an expression, in their order, without variables of quantifiers."""
-    found = [argument for atom in logic.atoms(parse(goal)) for argument in atom.arguments]
-    return list(dict.fromkeys(name for name in found if not name.startswith("?")))
 
 
 def _names(robots: Any) -> tuple[str, ...]:
