@@ -13,6 +13,7 @@ from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.free_floor import FreeFloor
+from ig2mj.planning.joints import openable_joints
 from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.pushing import _ways_aside
 from ig2mj.planning.spots import spots_upon
@@ -128,3 +129,25 @@ def test_what_another_hand_holds_is_in_the_way_where_the_robot_will_stand(world,
     assert not clear(empty, world.com("can")) and clear(elsewhere, world.com("can"))
     assert not clear(world.standing(elsewhere, stance, 0), there)
     assert clear(world.standing(elsewhere, stance, 1), there)
+
+
+def test_what_is_tiny_lies_below_the_fingers_of_a_palm_from_above_and_not_below_the_palm(world):
+    fingers = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    palms = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    points = np.zeros((3, 3))
+    bean = 0.01 * np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
+    stick = bean * (20.0, 1.0, 1.0)
+    behind = -grasps.BEHIND_TINY * fingers
+    assert np.allclose(grasps._under_fingers(bean, points, fingers, palms), [behind[0], behind[1], points[2]])
+    assert np.allclose(grasps._under_fingers(stick, points, fingers, palms), [points[0], behind[1], points[2]])
+
+
+def test_what_slides_is_taken_by_its_sides_at_several_heights_and_places(world):
+    joints = openable_joints(world.stage.scene, world.view, world.index("cabinet"))
+    (drawer,) = [joint for joint in joints if not joint.hinge]
+    low, high = drawer.vertices.min(0), drawer.vertices.max(0)
+    for point, normal in drawer.edges:
+        assert (low - 1e-6 <= point).all() and (point <= high + 1e-6).all() and abs(normal @ drawer.axis) < 1e-6
+        assert np.isclose((point - (low if normal.sum() < 0 else high)) @ normal, 0.0)
+    points = np.array([point for point, _ in drawer.edges])
+    assert len(np.unique(points[:, 2].round(3))) == 3 and len(np.unique((points @ drawer.axis).round(3))) == 3

@@ -63,6 +63,9 @@ which on it is not at the side."""
 GRAVITY, MOST_TORQUE, BURDEN = 9.81, 6.0, 0.6
 """m/s2; Nm from which on a hand does not keep what it holds level; discomfort of what is held badly."""
 
+TINY, BEHIND_TINY = 0.05, 0.04
+"""m along palm and fingers up to which a thing is tiny, and by which a palm that floats is behind its middle then."""
+
 MIDDLES = 8
 """Pieces whose middles are aimed at, at most."""
 
@@ -161,6 +164,8 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
         own = world.planner.obstacles(world.view, others, world.world)
         which, points = between_fingers(own, points, fingers, palms, body.opening)
         fingers, palms = fingers[which], palms[which]
+    else:
+        points = _under_fingers(corners, points, fingers, palms)
     before = np.where(_room(body, obstacles, points, fingers, palms, 0.0, AT_OBJECT), 0.0, -1.0)
     for away in (*BEFORE, FLAT) if body.opening is None else BEFORE:
         still = np.flatnonzero(before == 0.0)
@@ -176,6 +181,23 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
         GraspPose(points[k], fingers[k], palms[k], float(before[k]), min(float(burden[k]), 1.0), bool(s))
         for k, s in zip(good[first], scrapes[first], strict=True)
     ]
+
+
+def _under_fingers(
+    corners: Float[np.ndarray, "V 3"],
+    points: Float[np.ndarray, "N 3"],
+    fingers: Float[np.ndarray, "N 3"],
+    palms: Float[np.ndarray, "N 3"],
+) -> Float[np.ndarray, "N 3"]:
+    """Points for a palm that comes from above: on what is tiny, so far behind it that it lies below the fingers. Below
+    the palm, fingers that close are stopped by what it lies on before they come to it.
+
+    Args:
+      corners: of the object.
+    """
+    tiny = (np.ptp(corners @ palms.T, axis=0) < TINY) & (np.ptp(corners @ fingers.T, axis=0) < TINY)
+    tiny &= palms[:, 2] < -UPRIGHT
+    return points - BEHIND_TINY * tiny[:, None] * fingers
 
 
 def _fingers_have_room(

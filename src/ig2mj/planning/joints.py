@@ -19,6 +19,10 @@ the way."""
 FAR_OUT, HEIGHTS = 0.85, (0.35, 1.35)
 """Share of the distance from a hinge to the link's edge at which it is taken; m: heights at which it is best taken."""
 
+SIDE_PLACES = ((0.0, 0.0), (0.0, -0.3), (0.0, 0.3), (-0.35, 0.0), (0.35, 0.0), (-0.35, -0.3), (0.35, -0.3))
+"""Shares of the length of what slides, along its axis, and of its height, from its middle to where it is taken by its
+side."""
+
 Vector = Float[np.ndarray, "3"]
 
 FaceGrip = tuple[Vector, Vector]
@@ -167,13 +171,18 @@ def _grips(joint: OpenableJoint) -> tuple[tuple[FaceGrip, ...], tuple[FaceGrip, 
 
 
 def _side_grips(joint: OpenableJoint, middle: Vector) -> tuple[FaceGrip, ...]:
-    """Middles of the largest upright faces along which what slides moves, as of a window's sash."""
+    """Points of the largest upright faces along which what slides moves, as of a window's sash: their middles, and
+    others, which hands reach over furniture."""
     sides = [v for v in np.eye(3)[:2] if abs(v @ joint.axis) < 0.7]
     if not sides:
         return ()
     thin = min(sides, key=lambda v: float(np.ptp(joint.vertices @ v)))
-    depth = (joint.vertices - middle) @ thin
-    return (middle + float(depth.max()) * thin, thin), (middle + float(depth.min()) * thin, -thin)
+    depth, up = (joint.vertices - middle) @ thin, float(np.ptp(joint.vertices[:, 2])) * np.eye(3)[2]
+    along, found = float(np.ptp(joint.vertices @ joint.axis)) * joint.axis, []
+    for part, share in SIDE_PLACES:
+        at = middle + part * along + share * up
+        found += [(at + float(depth.max()) * thin, thin), (at + float(depth.min()) * thin, -thin)]
+    return tuple(found)
 
 
 def _about(axis: Vector, angle: float) -> Float[np.ndarray, "3 3"]:

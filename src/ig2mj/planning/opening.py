@@ -81,6 +81,9 @@ ARM_SWING, ARM_MOVES = 0.35, 14
 """Share of a joint's range by which an arm moves it from one stance where it does not follow it to its end; and such
 moves for one primitive."""
 
+SLIDES = (0.3, 0.15)
+"""Shares of its range by which a hand that floats moves what slides, where it does not reach all of the way at once."""
+
 STANCES, WAYS, ARM_WAYS = 20, 6, 12
 """Stances for each grip, and ways of a hand that are looked for, at most: of one that floats with each grip, and of one
 on an arm with one kind of grip."""
@@ -269,7 +272,7 @@ def _plan(
 ) -> _JointPlan | None:
     floor, obstacles = world.floor(), world.obstacles()
     passed, ways, floats = 0, _ways(world, joint, value, to), world.body.opening is None
-    steps = (1.0,) if floats else (1.0, ARM_SWING)
+    steps = (1.0, ARM_SWING) if not floats else (1.0,) if joint.hinge else (1.0, *SLIDES)
     others = set(range(len(world.domain.model.tables.object_names))) - {joint.object_index}
     own = world.planner.obstacles(world.view, others, world.world)
     for step, flat, (grips, end, pulls) in itertools.product(steps, (False,) if floats else (False, True), ways):

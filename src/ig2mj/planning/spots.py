@@ -43,6 +43,9 @@ TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 ORIENTATIONS, ORIENTATION_SPREAD = 2, 1.7
 """Orientations at rest that are tried, and rad by which they may be farther from the present one than the nearest."""
 
+OPEN = 0.25
+"""m to spare for the robot where it could stand, from which on floor is open."""
+
 UPON = ((0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.0, 0.05), (0.0, -0.05))
 """m from an object's centre of mass at which something is put upon it."""
 
@@ -101,6 +104,8 @@ def spots_for(
             found, asked = list[Vector](), 0
             positions = np.array(list(placer.spots(index, areas, new, world.rng, support))).reshape(-1, 3)
             cost = farther(positions)
+            if predicate == "on_floor":
+                cost += _cramped(world, positions)
             roofed = np.zeros(len(positions), bool)
             if middle is not None:  # below openings, and away from where doors shut
                 roofed = _roofed(positions, around, wide)
@@ -194,6 +199,16 @@ def _out_of_reach(world: PlannedWorld) -> Callable[[Float[np.ndarray, "n 3"]], F
         return np.where(far, np.inf, np.maximum(away - EASY, 0.0))
 
     return farther
+
+
+def _cramped(world: PlannedWorld, positions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
+    """By how much less than `OPEN` the robot has to spare where an object comes to lie, m: there hands and tools reach
+    it from few sides."""
+    if not len(positions):
+        return np.zeros(0)
+    floor = world.floor()
+    cells = np.clip(floor.occupancy.cells(positions[:, :2]), 0, np.array(floor.spare.shape) - 1)
+    return np.clip(OPEN - floor.spare[tuple(np.moveaxis(cells, -1, 0))], 0.0, 2 * OPEN)
 
 
 def _middle_of_fixed_part(world: PlannedWorld, name: str) -> Vector:
