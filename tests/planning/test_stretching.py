@@ -1,5 +1,6 @@
 """A body that hovers stretches and stoops where a program asks it to, and stays so until another one asks."""
 
+import dataclasses
 import types
 
 import numpy as np
@@ -29,6 +30,17 @@ def test_the_body_rises_and_stays_there_in_the_next_program(robot):
     carry = execution.begin([[stretch(0.2)]])
     action, carry = execution.advance(body, 0, carry, view)
     assert action[0, height] == pytest.approx(0.05) and carry.running.all()
+    carry = execution.begin_some(carry, {0: [Phase(hand=0, reset=True)]})
+    action, carry = execution.advance(body, 0, carry, view)
+    assert action[0, height] == pytest.approx(0.05)
+
+
+def test_the_body_stays_stretched_where_an_earlier_program_was_longer(robot):
+    body, height, view = robot
+    carry = execution.begin([[Phase(limit=1, after="")] * 5])
+    carry = execution.begin_some(carry, {0: [dataclasses.replace(stretch(0.2), limit=1)]})
+    while carry.running.all():
+        _, carry = execution.advance(body, 0, carry, view)
     carry = execution.begin_some(carry, {0: [Phase(hand=0, reset=True)]})
     action, carry = execution.advance(body, 0, carry, view)
     assert action[0, height] == pytest.approx(0.05)

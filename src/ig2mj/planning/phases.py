@@ -153,7 +153,7 @@ class Programs:
         for f in dataclasses.fields(self):
             old, new = getattr(self, f.name), getattr(others, f.name)
             if f.name != "length":
-                old, new = (np.pad(a, [(0, 0), (0, most - a.shape[1]), *[(0, 0)] * (a.ndim - 2)]) for a in (old, new))
+                old, new = (_longer(a, most, np.nan if f.name == "rise" else 0.0) for a in (old, new))
             old = old.copy()
             old[worlds] = new
             found[f.name] = old
@@ -167,3 +167,9 @@ class Programs:
             for f in dataclasses.fields(self)
             if f.name != "length"
         }
+
+
+def _longer(values: np.ndarray, count: int, fill: float) -> np.ndarray:
+    """Values of so many phases, [W, P, ...]; what is behind the end of a program is read when it has ended."""
+    more = [(0, 0), (0, count - values.shape[1]), *[(0, 0)] * (values.ndim - 2)]
+    return np.pad(values, more, constant_values=fill)
