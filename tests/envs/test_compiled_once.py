@@ -14,6 +14,7 @@ import ig2mj
 from ig2mj.envs.actor import Actor
 from ig2mj.envs.rollout import play
 from ig2mj.errors import ActionError
+from ig2mj.process.compilation import XLA_EVENT
 from ig2mj.sensors.base import SensorOptions
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
@@ -35,8 +36,8 @@ def compiled() -> Iterator[list[str]]:
     found: list[str] = []
 
     def listen(event: str, duration_secs: float, **kwargs: str | int) -> None:
-        if event == "/jax/core/compile/backend_compile_duration":
-            found.append(event)
+        if event == XLA_EVENT:
+            found.append(str(kwargs.get("fun_name")))
 
     jax.monitoring.register_event_duration_secs_listener(listen)
     yield found
@@ -56,6 +57,23 @@ def test_starts_from_rows_are_one_program(env, compiled):
     assert not compiled
     assert np.asarray(state.info["steps"]).tolist() == [2, 2]
     assert (np.asarray(state.obs["scan"]) < 1).any()
+
+
+def test_the_steps_of_an_actor_are_compiled_together_with_the_start(env, compiled, monkeypatch):
+    """While kernels are being loaded, for which the engine's reset waits."""
+    short = env.with_horizon(3)
+    engine, reset, before = short.core.engine, short.core.engine.reset, list[str]()
+    first = engine._first.traced(engine._template, engine._initial)
+    monkeypatch.setattr(engine, "pending_reset_program", lambda: first)
+    monkeypatch.setattr(engine, "reset", lambda: (before.extend(compiled), compiled.clear(), reset())[2])
+    played = play(short, Actor(short, _still), WORLDS, in_order=True)
+    assert {"jit(_load_fn)", "jit(_several_fn)"} <= set(before)
+    assert not set(before) & set(compiled), "the calls find what was compiled"
+    assert played.steps == 3 * WORLDS and short.following is None
+
+
+def _still(obs, kept, begins, key):
+    return jnp.zeros((WORLDS, 2)), kept
 
 
 def test_an_actor_takes_the_steps_that_python_would_take(env, compiled):

@@ -9,6 +9,7 @@ Axes: W worlds, n numbers of an action, m numbers that are remembered.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import jax
@@ -22,7 +23,7 @@ from ig2mj.envs.environment import Environment
 from ig2mj.envs.state import EnvState
 from ig2mj.errors import ActionError
 from ig2mj.process import entry_point
-from ig2mj.process.gc_pause import Compiled
+from ig2mj.process.gc_pause import Compiled, Traced
 
 STEPS = 20
 """The most agent steps of one call."""
@@ -53,8 +54,12 @@ class Tally:
     literals: Bool[Array, "W L"]
 
     @classmethod
-    def begun(cls, state: EnvState, outcomes: Sequence[str] = ()) -> Tally:
-        """At the start of episodes. `outcomes`: names of what the task measures."""
+    def begun(cls, state: Any, outcomes: Sequence[str] = ()) -> Tally:
+        """At the start of episodes.
+
+        Args:
+          state: what has its reward and status. outcomes: names of what the task measures.
+        """
         none = np.zeros(np.shape(state.reward), bool)
         literals = np.asarray(state.status.literals)
         return cls(~none, none, {n: none for n in outcomes}, none.astype(np.float32), np.int32(0), literals)
@@ -120,6 +125,17 @@ class Actor:
         if count := int(np.asarray(state.bad_actions).sum()):
             raise ActionError(f"{count} numbers of actions of {self._env.task.name} are not finite")
         return state, tally
+
+    def traced(self, state: Any, outcomes: Sequence[str] = ()) -> Traced:
+        """The program of `several`, traced and not compiled.
+
+        Args:
+          state: shapes of what it is given. outcomes: names of what the task measures.
+        """
+        zeros = jax.tree.map(lambda a: np.zeros(a.shape, a.dtype), (state.reward, state.status))
+        tally = Tally.begun(SimpleNamespace(reward=zeros[0], status=zeros[1]), outcomes)
+        keys = np.zeros((STEPS, 2), np.uint32)
+        return self._several.traced(state, tally, self._kept, keys, np.int32(STEPS), *self._more)
 
     def _several_fn(
         self,

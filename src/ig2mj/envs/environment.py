@@ -76,7 +76,11 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
       num_worlds: W. action_names: [n]. observation_spaces: of each, without the world axis. sensor_options: settings.
       privileged_names, proprioception_names: what each number of these observations means.
       period: seconds of an agent step.
+      following: programs that step the state with which episodes begin, traced from its shapes; None: they are compiled
+        when they are called. `start_from` and `start_with` compile them together with their own.
     """
+
+    following: Callable[[Any], Sequence[Traced]] | None = None
 
     def __init__(
         self,
@@ -263,8 +267,7 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         rows = np.asarray(rows)
         if rows.shape != (self.num_worlds,) or rows.min() < 0 or rows.max() >= size:
             raise EngineError(f"start_from takes {self.num_worlds} rows, each from 0 to {size - 1}")
-        with GC_PAUSED:
-            return self._load(self.core.engine.reset(), as_seed(seed, self.num_worlds), None, rows.astype(np.int32))
+        return self._loaded(seed, None, None, rows.astype(np.int32))
 
     def start_with(
         self, starts: Pool, draw: Draw | None = None, rows: Int[np.ndarray, "W"] | None = None, seed: Seed = 0
@@ -281,19 +284,27 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         if starts.size != self.num_worlds:
             raise EngineError(f"start_with takes {self.num_worlds} start states, not {starts.size}")
         rows = np.zeros(self.num_worlds, np.int32) if rows is None else np.asarray(rows, np.int32)
-        with GC_PAUSED:
-            state = self._load(self.core.engine.reset(), as_seed(seed, self.num_worlds), starts, rows)
-            if draw is None:
-                return state
-            if jax.tree.map(np.shape, draw) != jax.tree.map(np.shape, state.batch.draw):
-                raise EngineError("the draw has other axes or numbers of worlds than the environment (randomize=...)")
-            batch = dataclasses.replace(state.batch, draw=jax.tree.map(jnp.asarray, draw))
-            return self._resume(batch, np.ones(self.num_worlds, bool), None, rows)
+        return self._loaded(seed, starts, None if draw is None else jax.tree.map(jnp.asarray, draw), rows)
 
-    def _load_fn(self, physics: Physics, seed: Seeds, starts: Pool | None, rows: Int[Array, "W"]) -> EnvState:
+    def _loaded(self, seed: Seed, starts: Pool | None, draw: Draw | None, rows: Int[np.ndarray, "W"]) -> EnvState:
+        """`start_from`, or with states `start_with`. While kernels are being loaded, its programs are compiled together
+        with those that follow."""
+        seeds, physics = as_seed(seed, self.num_worlds), self.core.engine.pending_reset_program()
+        if physics is not None:
+            load = self._load.traced(physics.returned, seeds, starts, draw, rows)
+            compile_together([*(() if self.following is None else self.following(load.returned)), load, physics])
+        with GC_PAUSED:
+            return self._load(self.core.engine.reset(), seeds, starts, draw, rows)
+
+    def _load_fn(
+        self, physics: Physics, seed: Seeds, starts: Pool | None, draw: Draw | None, rows: Int[Array, "W"]
+    ) -> EnvState:
         batch, own = self.core.start_fn(physics, seed), self.core.starts
         key = batch.world.key
-        starts, draw = own.rows(jnp.asarray(rows), key) if starts is None else own.drawn(starts, key)
+        starts, usual = own.rows(jnp.asarray(rows), key) if starts is None else own.drawn(starts, key)
+        if draw is not None and jax.tree.map(np.shape, draw) != jax.tree.map(np.shape, usual):
+            raise EngineError("the draw has other axes or numbers of worlds than the environment (randomize=...)")
+        draw = usual if draw is None else draw
         batch = dataclasses.replace(self.core.load_fn(batch, starts.physics, starts.states), draw=draw)
         return self._begun(batch, jnp.ones(self.num_worlds, bool), None, rows)
 

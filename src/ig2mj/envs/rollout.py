@@ -127,21 +127,25 @@ def _in_order(
 ) -> Played:
     size, worlds = env.core.starts.pool.size, env.num_worlds
     tallies, pace, state, metrics = list[Tally](), Pace(watch), None, collections.Counter[str]()
-    begun, failed = list[np.ndarray](), None
+    begun, failed, together = list[np.ndarray](), None, None
+    if isinstance(act, Actor) and env.pure and watch is None:
+        together = act
+        env.following = lambda state: [together.traced(state, env.objective.outcomes)]
     for first in range(0, episodes, worlds):
         rows = (begin + first + np.arange(worlds)) % size
         if start is not None:
             state = start(rows)
         else:
             state = env.start_from(rows, seed if isinstance(seed, int) else [seed[int(row)] for row in rows])
+        env.following = None  # compiled once
         pace.look(state)
         tally = Tally.begun(state, env.objective.outcomes)
         begun.append(np.asarray(state.status.literals))
         try:
             while tally.going.any():
                 before = int(tally.steps)
-                if isinstance(act, Actor) and env.pure and watch is None:
-                    state, tally = act.several(state, tally, STEPS if pace.begun else 1)
+                if together is not None:
+                    state, tally = together.several(state, tally, STEPS if pace.begun else 1)
                 else:
                     state = env.step(state, resting(act(state), tally.going))
                     tally = tally.after(jax.device_get(ending(state, env.objective.outcomes)))

@@ -159,7 +159,7 @@ def setup_activity(
 
 def _standing(task: Task, rows: Pool) -> tuple[float, float, float]:
     """Where a robot starts: x, y (m) and degrees; in a home without a map of its floor where its geometry has room."""
-    bare = load_scene(task.home, objects=task.objects)
+    bare = bare_scene(task)
     if bare.rooms is not None and bare.rooms.traversable is not None:
         return standing_place(task.home, task.objects, task.objects_of_interest, rows)
     query = SceneQuery(bare)

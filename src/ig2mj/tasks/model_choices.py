@@ -29,11 +29,12 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.additions import name_additions
+from ig2mj.scene.bare_scenes import bare_scene
 from ig2mj.scene.library import LibraryName, find_model, library
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.model_splits import models_with_parts
 from ig2mj.scene.paths import scene_folder
-from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
@@ -189,7 +190,7 @@ def widened(pool: Pool, base: Scene, scene: Scene) -> Pool:
     Raises:
       EngineError: the household is not the same in both.
     """
-    bare = load_scene(scene.folder, objects=scene.requested)
+    bare = bare_scene(scene.folder, scene.requested)
     small, large = make_layout(base.model, base.tables), make_layout(bare.model, bare.tables)
     joints = [[m.joint(j).name for j in range(m.njnt)] for m in (base.model, bare.model)]
     names = base.object_names, bare.object_names

@@ -14,7 +14,6 @@ import json
 import pathlib
 import re
 import sys
-import threading
 from collections.abc import Callable, Generator, Iterator
 from pathlib import PurePath
 
@@ -31,7 +30,8 @@ from ig2mj.process.processors import available
 from ig2mj.process.progress import progress as shown
 from ig2mj.process.spawning import processes_for, worker_processes
 from ig2mj.sampling.many import sample
-from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.scene import bare_scenes
+from ig2mj.scene.scene import Scene
 from ig2mj.tasks.custom.code import NOTEBOOK
 from ig2mj.tasks.custom.code import shown as shown_file
 from ig2mj.tasks.custom.start import start_rows
@@ -61,14 +61,9 @@ FLAT = 0.98
 """Cosine of the angle between an object's z axis and the vertical from which it lies flat: 11 degrees."""
 
 
-_loading = threading.Lock()
-"""Pools may be made in threads (`ig2mj sample-task all`); MuJoCo does not promise that two may parse XML at a time."""
-
-
 def bare_scene(task: Task) -> Scene:
     """The task's household without a robot."""
-    with _loading:
-        return load_scene(task.home, objects=task.objects)
+    return bare_scenes.bare_scene(task.home, task.objects)
 
 
 @entry_point

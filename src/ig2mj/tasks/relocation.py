@@ -34,10 +34,11 @@ from ig2mj.errors import EngineError
 from ig2mj.geometry.poses import quat_rotate
 from ig2mj.sampling.conditions import read_conditions
 from ig2mj.scene.additions import name_additions
+from ig2mj.scene.bare_scenes import bare_scene
 from ig2mj.scene.library import LibraryName
 from ig2mj.scene.object_requests import read_request
 from ig2mj.scene.paths import SHIPPED_HOMES, scene_folder
-from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import LinkKind
 from ig2mj.tasks.task import Acts, Fit, Near, Task
 
@@ -229,7 +230,7 @@ def home_name(home: str | os.PathLike) -> str:
 
 def _difference(task: Task, folder: pathlib.Path) -> str:
     """What a home has not, or has elsewhere, of what the task needs of its own home; "": nothing."""
-    own, other = load_scene(task.home), load_scene(folder)
+    own, other = bare_scene(task.home), bare_scene(folder)
     arguments = [a for condition in read_conditions(task.start) for a in condition.arguments]
     named = [name for name in dict.fromkeys([*arguments, *task.objects_of_interest]) if name in own.object_names]
     missing = [name for name in named if name not in other.object_names]
@@ -251,7 +252,7 @@ def _difference_around(task: Task, own: Scene, other: Scene, placed: list[str]) 
     around, free = list[list[str]](), list[list[bool]]()
     robots = {name: acts.pos[:2] for name, acts in task.robots.items() if acts.pos is not None}
     for scene in (own, other):
-        household = Household(load_scene(scene.folder, objects=placed))
+        household = Household(bare_scene(scene.folder, placed))
         around.append([household.next_to(name) for name, _ in name_additions(scene.object_names, placed)])
         free.append([bool(household.free(np.array([pos]), 0.0)[0]) for pos in robots.values()])
     for request, here, there in zip(placed, *around, strict=True):
@@ -266,7 +267,7 @@ def _difference_around(task: Task, own: Scene, other: Scene, placed: list[str]) 
 
 def _names_of_added(task: Task, folder: pathlib.Path) -> dict[str, str]:
     """What objects that the task adds are called in a home, where that differs from its own home."""
-    own, other = (name_additions(load_scene(f).object_names, task.objects) for f in (task.home, folder))
+    own, other = (name_additions(bare_scene(f).object_names, task.objects) for f in (task.home, folder))
     return {here: there for (here, _), (there, _) in zip(own, other, strict=True) if here != there}
 
 
@@ -280,7 +281,7 @@ def _own(task: Task) -> tuple[float, float, float]:
 @functools.lru_cache(maxsize=256)
 def _spot(name: str, fit: Fit, own: tuple[float, float, float], folder: str) -> Spot:
     """The best spot in a home. Raises EngineError: there is none."""
-    home = Household(load_scene(folder))
+    home = Household(bare_scene(folder))
     label = home.scene.name
     anchors = [a for kind in fit.anchors for a in home.of(kind)] if fit.anchors else [""]
     surfaces = [(s, rank) for rank, kind in enumerate(fit.surfaces) for s in home.of(kind)]
@@ -391,7 +392,7 @@ def _moved(task: Task, home: str, spot: Spot) -> Task:
     names = {fit.surface: spot.surface} | ({fit.anchor: spot.anchor} if fit.anchor else {})
     objects = task.objects
     if fit.of_home:
-        taken = load_scene(scene_folder(home)).object_names
+        taken = bare_scene(home).object_names
         added = tuple(LibraryName(name.rsplit("_", 1)[0]) for name in fit.of_home)
         names |= dict(zip(fit.of_home, (n for n, _ in name_additions(list(taken), added)), strict=True))
         objects = (*objects, *added)
