@@ -302,7 +302,7 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         batch, own = self.core.start_fn(physics, seed), self.core.starts
         key = batch.world.key
         starts, usual = own.rows(jnp.asarray(rows), key) if starts is None else own.drawn(starts, key)
-        if draw is not None and jax.tree.map(np.shape, draw) != jax.tree.map(np.shape, usual):
+        if draw is not None and _shapes(draw) != _shapes(usual):
             raise EngineError("the draw has other axes or numbers of worlds than the environment (randomize=...)")
         draw = usual if draw is None else draw
         batch = dataclasses.replace(self.core.load_fn(batch, starts.physics, starts.states), draw=draw)
@@ -446,3 +446,9 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
 
     def close(self) -> None:
         """Does nothing, since an environment holds no open resources. May be called twice."""
+
+
+def _shapes(draw: Draw) -> tuple[Any, list[tuple[int, ...]]]:
+    """Which fields are given, and their shapes."""
+    leaves, given = jax.tree.flatten(draw)
+    return given, [np.shape(leaf) for leaf in leaves]
