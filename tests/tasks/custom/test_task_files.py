@@ -74,7 +74,7 @@ def test_a_class_of_a_file_is_a_task(file, tiny_home_folder):
     task = find_task(f"{file}:AppleToFloor")
     assert isinstance(task, Task)
     assert (task.name, task.summary, task.horizon) == ("AppleToFloor", "Put the apple on the floor.", 20)
-    assert task.home == str(tiny_home_folder) and task.objects_of_interest == ("apple", "kitchen_0")
+    assert task.home == str(tiny_home_folder) and task.objects_of_interest == ("apple",)
     assert task.robots["humanoid"].pos == (0.0, -1.0) and task.robots["humanoid"].hands == (1,)
     assert task.code is not None and task.code.has_functions and task.code.file == str(file.resolve())
 
