@@ -8,7 +8,7 @@ import pytest
 
 import ig2mj
 from ig2mj.agents import Humanoid
-from ig2mj.planning import grasps
+from ig2mj.planning import clutter, grasps
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
@@ -18,6 +18,7 @@ from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.pushing import _ways_aside
 from ig2mj.planning.spots import spots_upon
 from ig2mj.planning.stances import stances
+from ig2mj.planning.steps import Step
 from ig2mj.planning.world import AWAY, PlannedWorld
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.worlds.rules import Rules
@@ -151,3 +152,19 @@ def test_what_slides_is_taken_by_its_sides_at_several_heights_and_places(world):
         assert np.isclose((point - (low if normal.sum() < 0 else high)) @ normal, 0.0)
     points = np.array([point for point, _ in drawer.edges])
     assert len(np.unique(points[:, 2].round(3))) == 3 and len(np.unique((points @ drawer.axis).round(3))) == 3
+
+
+def test_floor_from_where_hands_reach_with_ease_comes_first(world, monkeypatch):
+    point = world.com("apple")
+    step = Step("grasp", ("apple",))
+    assert clutter._nearer(world, step, point) < world.body.reach - clutter.GAIN
+    assert clutter.clutter_in_the_way(world, step) is None
+    monkeypatch.setattr(clutter, "_loose", lambda world, step: [])
+    whole = PlannedWorld.floor
+
+    def shut(self, **options):
+        floor = whole(self, **options)
+        return FreeFloor(floor.occupancy, np.zeros_like(floor.free), floor.spare) if not options else floor
+
+    monkeypatch.setattr(PlannedWorld, "floor", shut)
+    assert clutter._nearer(world, step, point) == world.body.reach

@@ -43,7 +43,7 @@ def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, 
             return (yield from bring_out(world, name)).done
         point = target_of(world, step)
         assert point is not None  # else nothing was in the way
-        others, reach = [n for n in _loose(world, step) if n != name], _nearer(world, point)
+        others, reach = [n for n in _loose(world, step) if n != name], _nearer(world, step, point)
         opens = lambda floor: nearest_floor(world, floor, point, reach) is not None  # noqa: E731
         return (yield from push_aside(world, name, opens, others))
     except PrimitiveFailed:
@@ -59,7 +59,7 @@ def clutter_in_the_way(world: PlannedWorld, step: Step) -> str | None:
     """The first thing on the way to what a step is about, without loose things; None: the robot comes as near to that
     with them as without."""
     point = target_of(world, step)
-    if point is None or (reach := _nearer(world, point)) <= 0.0:
+    if point is None or (reach := _nearer(world, step, point)) <= 0.0:
         return None
     loose = _loose(world, step)
     freed = world.floor(without=[world.index(n) for n in loose])
@@ -80,18 +80,22 @@ def clutter_in_the_way(world: PlannedWorld, step: Step) -> str | None:
     return min(met)[1] if met else None
 
 
-def _nearer(world: PlannedWorld, point: Float[np.ndarray, "3"]) -> float:
-    """m from a point within which there is floor that is better than all to which the robot can drive."""
+def _nearer(world: PlannedWorld, step: Step, point: Float[np.ndarray, "3"]) -> float:
+    """m from a point within which there is floor that is better than all to which the robot can drive: from where its
+    hands reach the point with ease, where there is such floor without loose things."""
     floor, (here, _) = world.floor(), world.base
-    reach = world.body.reach + float(np.linalg.norm(world.body.shoulders[:, :2], axis=1).max())
-    cells = floor.within(point[:2], reach)
+    easy = world.body.reach
+    far = easy + float(np.linalg.norm(world.body.shoulders[:, :2], axis=1).max())
+    cells = floor.within(point[:2], far)
     cells = cells[np.isfinite(floor.distances(here, NEAR_START)[tuple(cells.T)])]
     middles, obstacles = floor.occupancy.middles(cells), world.obstacles()
     apart = np.linalg.norm(middles - point[:2], axis=1)
     for k in np.argsort(apart)[:: max(1, len(apart) // LOOKED_AT)]:
         if not behind_wall(world, obstacles, middles[k], point):
-            return float(apart[k]) - GAIN
-    return reach
+            far = float(apart[k]) - GAIN
+            break
+    freed = world.floor(without=[world.index(n) for n in _loose(world, step)])
+    return easy if easy < far and nearest_floor(world, freed, point, easy) is not None else far
 
 
 def nearest_floor(world: PlannedWorld, floor: FreeFloor, point: Float[np.ndarray, "3"], reach: float) -> Point | None:
