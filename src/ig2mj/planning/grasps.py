@@ -166,10 +166,15 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
         fingers, palms = fingers[which], palms[which]
     else:
         points = _under_fingers(corners, points, fingers, palms)
-    before = np.where(_room(body, obstacles, points, fingers, palms, 0.0, AT_OBJECT), 0.0, -1.0)
+    if not len(points):
+        return []
+    spheres = np.stack([body.hand_spheres(f, p) for f, p in zip(fingers, palms, strict=True)])
+    centres = points[:, None] + spheres[..., :3]
+    before = np.where(_room(obstacles, centres, AT_OBJECT * spheres[..., 3]), 0.0, -1.0)
     for away in (*BEFORE, FLAT) if body.opening is None else BEFORE:
         still = np.flatnonzero(before == 0.0)
-        before[still[_room(body, obstacles, points[still], fingers[still], palms[still], away, 1.0)]] = away
+        off = centres[still] - away * palms[still, None]
+        before[still[_room(obstacles, off, spheres[still, :, 3])]] = away
     lever = world.mass(name) * GRAVITY * np.linalg.norm((points - centre)[:, :2], axis=1)
     low = (points[:, 2] < corners[:, 2].min() + LOW) & (np.abs(palms[:, 2]) < UPRIGHT)
     burden = np.minimum(lever / MOST_TORQUE, 1.0) + low
@@ -242,21 +247,10 @@ def between_fingers(
 
 
 def _room(
-    body: HandedBody,
-    obstacles: Obstacles,
-    points: Float[np.ndarray, "N 3"],
-    fingers: Float[np.ndarray, "N 3"],
-    palms: Float[np.ndarray, "N 3"],
-    away: float,
-    share: float,
+    obstacles: Obstacles, centres: Float[np.ndarray, "N S 3"], radii: Float[np.ndarray, "N S"]
 ) -> Bool[np.ndarray, "N"]:
-    """Whether hands have room so far above surfaces."""
-    if not len(points):
-        return np.zeros(0, bool)
-    spheres = np.stack([body.hand_spheres(f, p) for f, p in zip(fingers, palms, strict=True)])
-    centres = (points - away * palms)[:, None] + spheres[..., :3]
-    distance = obstacles.distance(centres)
-    return np.all(distance >= share * spheres[..., 3], axis=1)
+    """Whether the spheres of hands have room."""
+    return np.all(obstacles.distance(centres) >= radii, axis=1) if len(centres) else np.zeros(0, bool)
 
 
 def ordered(poses: Sequence[GraspPose], yaw: float, on_arm: bool = False) -> list[GraspPose]:
