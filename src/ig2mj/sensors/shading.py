@@ -41,7 +41,7 @@ SHINE = (
 KNOWN_SHADOWS = ("        use_shadows,\n", '        wp.static(rc_static["use_shadows"]),\n')
 """Whether shadows are cast is compiled into the kernel. Otherwise it has the code of a shadow ray for every light."""
 
-REGISTERS: int | None = None
+REGISTERS: int | None = 80
 """The most registers of a thread of the kernel, in CUDA. With fewer, a multiprocessor holds more threads, which hide
 each other's reads of the trees, but each moves more of its values to memory. None: as many as the compiler chooses."""
 
