@@ -98,7 +98,7 @@ def sample(problem: Problem, split: str, count: int) -> None:
 
 def solve_starts(problem: Problem, args: argparse.Namespace) -> None:
     """Solves the starts one after another. An error of one is its result."""
-    planner = TaskPlanner(Domain(problem.model, make_robot(args.robot).hand_count), problem.goal)
+    planner = TaskPlanner(Domain.of_robot(problem.model, make_robot(args.robot)), problem.goal)
     planner = planner_of(args.agent, planner, problem, args.seed)
     left, args.moved_objects = list(args.starts), {}
     while left:

@@ -60,6 +60,7 @@ class TaskRobot(abc.ABC):
     Attributes:
       stands: m of `pos` above the floor on which the robot stands.
       drives: it has the actions "forward" and "turn_left" of navigation tasks.
+      hand_lifts: kg that one of its hands lifts and carries; infinite: not known.
       hand_controls: of the hands that tasks can move, in the order of the scene's hands.
       own_actions: tasks give it every number of its controller, not only hands and drive.
     """
@@ -70,6 +71,7 @@ class TaskRobot(abc.ABC):
     stands: ClassVar[float] = 0.0
     drives: Any = False
     own_actions: ClassVar[bool] = False
+    hand_lifts: ClassVar[float] = math.inf
     hand_controls: ClassVar[tuple[HandControl, ...]] = ()
 
     @property

@@ -87,7 +87,7 @@ class PrimitiveEnv(gymnasium.Env):
             raise EngineError(f"horizon={horizon}, pool_size={pool_size}: at least 1 each")
         self.problem: Problem = problem_of(*(split_goal_name(name) or (name,)))
         self._robot, self._kind, self._split, self._horizon = robot, rung, split, horizon
-        self.domain = Domain(self.problem.model, make_robot(robot).hand_count)
+        self.domain = Domain.of_robot(self.problem.model, make_robot(robot))
         if self.domain.hands < 1:
             raise PlanningError(f"{robot} has no hands: it cannot change a household (take a robot with hands)")
         self._pool = self.problem.pool(split, pool_size)

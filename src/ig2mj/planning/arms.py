@@ -69,6 +69,7 @@ class ArmBody(WheeledBody):
 
     resting = tucked = None
     rises = (0.0, 0.0)
+    lifts = np.inf
 
     def __init__(self, scene: Scene, controller: Controller, agent: int, model: ArmModel):
         super().__init__(scene, controller, agent)

@@ -71,6 +71,10 @@ _BODY = tuple(f"body_{n}" for n in ("x", "y", "z", "roll", "pitch", "yaw"))
 QUICK = 0.08
 """m of an empty hand that floats in an agent step."""
 
+TOGETHER = (0.03, 0.06)
+"""m and rad in an agent step of a base whose hands hold the same: they lose what is too heavy for one in quicker
+turns."""
+
 UPRIGHT = 0.5
 """Share of a hovering body's tilt and of its error of height that is taken back in an agent step."""
 
@@ -189,8 +193,10 @@ class HandedBody(Body, Protocol):
       rises: m by which the body stoops, and stretches, for what its hands do not reach otherwise.
       tucked: [H, 3] m, where empty hands are in narrow places; None: as they are.
       opening: m between the fingers of a gripper; None: a hand that takes hold with its palm.
+      lifts: kg that one hand lifts; where it lifts less than an object's mass, two hands take it.
     """
 
+    lifts: float
     reach: float
     shoulders: Float[np.ndarray, "H 3"]
     carry: Float[np.ndarray, "H 3"]
@@ -321,6 +327,7 @@ class HoveringBody(_Body):
         self.arm = np.zeros(0, int)
         robot = scene.agents[agent]
         self.stands = float(robot.stands) if isinstance(robot, TaskRobot) else 0.0
+        self.lifts = float(robot.hand_lifts) if isinstance(robot, TaskRobot) else np.inf
         self.reach, self.shoulders = HAND_REACH - SPARE_REACH, np.array(SHOULDER_POS)
         self.carry = np.array([[CARRY[0], side * CARRY[1], CARRY[2]] for side in (1, -1)])
         self.tucked = np.array([[TUCKED[0], side * TUCKED[1], TUCKED[2]] for side in (1, -1)])
@@ -333,13 +340,17 @@ class HoveringBody(_Body):
         action[:, self._places(*_BODY)] = self._base(senses, rows)
         for number, control in enumerate(self._controls):
             mine = rows["hand"] == number
-            if not mine.any():
+            follows = (rows["both"] > 0) & (rows["hand"] >= 0) & ~mine
+            if not (mine | follows).any():
                 continue
             move, turn = self._hand(senses, rows, number)
-            action[:, self._places(*control.move)] = np.where(mine[:, None], move, 0.0)
+            for other in range(len(self._controls)) if follows.any() else ():
+                leads = follows & (rows["hand"] == other)
+                move = np.where(leads[:, None], self._hand(senses, rows, other)[0], move)
+            action[:, self._places(*control.move)] = np.where((mine | follows)[:, None], move, 0.0)
             action[:, self._places(*control.turn)] = np.where(mine[:, None], turn, 0.0)
             close = np.where(rows["close"] < 0, 0.0, np.where(rows["close"] > 0, -control.opens, control.opens))
-            action[:, self._places(control.close)] = np.where(mine, close, 0.0)[:, None]
+            action[:, self._places(control.close)] = np.where(mine | follows, close, 0.0)[:, None]
             reset = control.close.replace("trigger", "reset")
             if reset in self._names:
                 action[:, self._places(reset)] = np.where(mine & (rows["reset"] > 0), 1.0, 0.0)[:, None]
@@ -353,14 +364,17 @@ class HoveringBody(_Body):
         heading = np.where(mode == Base.DRIVE, np.arctan2(offset[:, 1], offset[:, 0]), rows["yaw"])
         left = _wrapped(heading - senses.yaw)
         left = np.where((mode == Base.STAY) | ((mode == Base.DRIVE) & (apart < AT_ONCE)), 0.0, left)
+        together = senses.held.all(1).any(1)  # all hands hold the same
         moves = (mode == Base.SHIFT) | ((mode == Base.DRIVE) & (np.abs(left) < AHEAD))
         speed = np.where(rows["hand"] >= 0, SPEED_OF_BASE, rows["speed"])
+        speed = np.where(together, np.minimum(speed, TOGETHER[0]), speed)
+        most = np.where(together, TOGETHER[1], TURN_STEP)
         share = np.where(moves, np.minimum(1.0, speed / np.maximum(apart, 1e-6)), 0.0)
         rise = UPRIGHT * (self.stands + rows["rise"] - senses.base_pos[:, 2])
         move = np.concatenate([share[:, None] * offset, np.clip(rise, -0.05, 0.05)[:, None]], axis=1)
         up = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), move.shape)
         turn = UPRIGHT * cross(quat_rotate(senses.base_quat, up), up)
-        turn[:, 2] = np.clip(left, -TURN_STEP, TURN_STEP)
+        turn[:, 2] = np.clip(left, -most, most)
         own = [np.asarray(quat_rotate_inverse(senses.base_quat, v.astype(np.float32))) for v in (move, turn)]
         return np.concatenate(own, axis=1)
 

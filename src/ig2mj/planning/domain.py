@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
+from collections.abc import Iterable
 
 import numpy as np
 
+from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.registry import find
@@ -38,11 +41,27 @@ class Domain:
     """Constants of one scene and robot.
 
     Attributes:
-      model: of the scene's states. hands: number of objects that the robot can hold at a time.
+      model: of the scene's states. hands: of the robot. lifts: kg that one of them lifts.
     """
 
     model: StateModel
     hands: int = 2
+    lifts: float = math.inf
+
+    @classmethod
+    def of_robot(cls, model: StateModel, robot: TaskRobot) -> Domain:
+        """With the hands that a robot has."""
+        return cls(model, robot.hand_count, robot.hand_lifts)
+
+    def hands_for(self, name: str) -> int:
+        """Hands that it takes to lift an object: two where one does not lift its mass, and there are two."""
+        if self.hands < 2 or not self.graspable(name):
+            return 1
+        return 1 + bool(self.model.tables.object_mass[self.index(name)] > self.lifts)
+
+    def hands_taken(self, held: Iterable[str]) -> int:
+        """Hands that hold objects of these names."""
+        return sum(self.hands_for(name) for name in set(held))
 
     def index(self, name: str) -> int:
         """Position of an object. Raises UnknownNameError."""

@@ -156,7 +156,7 @@ def _ended(body: Body, senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
         near = ((rows["moves"] == 0) | near) & ((rows["turns"] == 0) | (angle < rows["turn_tolerance"]))
         there &= ~mine | near
         held |= mine & senses.held[world, number, index]
-        empty &= ~mine | ~senses.held[:, number].any(1)
+        empty &= ~(mine | ((rows["both"] > 0) & (rows["hand"] >= 0))) | ~senses.held[:, number].any(1)
     touched = senses.touching[world, index]
     until = rows["until"]
     return np.select(
@@ -199,6 +199,7 @@ def _far(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
 
 
 def _lost(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
-    """Worlds in which what had to stay in a hand is in none."""
-    kept = senses.held[np.arange(len(rows["keeps"])), :, np.maximum(rows["keeps"], 0)].any(1)
+    """Worlds in which what had to stay in a hand is in none, or what had to stay in all is not."""
+    holds = senses.held[np.arange(len(rows["keeps"])), :, np.maximum(rows["keeps"], 0)]
+    kept = np.where(rows["both"] > 0, holds.all(1), holds.any(1))
     return (rows["keeps"] >= 0) & ~kept

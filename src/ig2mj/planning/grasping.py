@@ -16,14 +16,8 @@ from ig2mj.planning.grasps import GraspPose, grasp_poses, ordered
 from ig2mj.planning.moves import (
     ATTEMPTS,
     BELOW,
-    CLOSING,
-    COMING,
-    GRIPPING,
-    NEAR,
     OPENS,
     RETREAT,
-    THIN,
-    TOUCHING,
     UP,
     Primitive,
     Program,
@@ -34,7 +28,6 @@ from ig2mj.planning.moves import (
     hand_path,
     hand_with,
     rest,
-    towards,
     travel,
     vector3,
 )
@@ -42,6 +35,8 @@ from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.stances import reaching_all, stances
 from ig2mj.planning.steps import Outcome, Step
+from ig2mj.planning.taking import closing_on, entries, way_to
+from ig2mj.planning.two_hands import grasp_with_both, holds_with_both, release_with_both
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
 
 LIFT = 0.03
@@ -82,6 +77,8 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
     better by at least `CLEARLY`, these first; None: those that leave the side of a tool free that cleans.
     """
     name = step.object
+    if world.domain.hands_for(name) > 1:
+        return (yield from grasp_with_both(world, name))
     if name in world.held:
         return Outcome()
     if not is_graspable(world, name):
@@ -130,31 +127,15 @@ def is_graspable(world: PlannedWorld, name: str) -> bool:
 
 def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generator[Program, str, tuple[str, str]]:
     """Takes an object from where the robot stands; returns why it did not, as a reason and in words."""
-    index = world.index(name)
-    start, quat = pose.at(pose.before), world.body.turned(hand, pose.fingers, pose.palm)
-    way = yield from from_home(world, hand, functools.partial(_way, world, name, hand, pose))
+    index, start = world.index(name), pose.at(pose.before)
+    way = yield from from_home(world, hand, functools.partial(way_to, world, name, hand, pose))
     if way is None:
         return "no_path", f"the hand has no path to {name}"
     lift = LIFT * UP * float(pose.palm @ UP > -0.9)
-    deep, floats = vector3(pose.at(-BELOW)), world.body.opening is None
-    thin = floats and float(np.ptp(world.vertices(name) @ pose.palm)) < THIN
-    near = Phase(
-        hand=hand,
-        pos=vector3(pose.at(min(NEAR, pose.before))),
-        quat=quat,
-        tolerance=0.01,
-        limit=12,
-        after="",
-        speed=COMING,
-    )
     reason = yield [
-        *travel(hand, way, quat),
-        *([near] if thin else []),
-        Phase(hand=hand, pos=deep, quat=quat, until=Until.TOUCHED, object=index, close=False, limit=25, after="",
-              speed=TOUCHING if thin else COMING),
-        Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15, after="no_grasp",
-              speed=CLOSING if floats else GRIPPING),
-        *([Phase(hand=hand, pos=deep, close=True, until=Until.WAITED, limit=FIRM)] if world.body.friction else []),
+        *closing_on(world, name, hand, pose, way),
+        *([Phase(hand=hand, pos=vector3(pose.at(-BELOW)), close=True, until=Until.WAITED, limit=FIRM)]
+          if world.body.friction else []),
         *([Phase(hand=hand, pos=vector3(pose.at(0.0) + lift), keeps=index, close=True, tolerance=0.02, limit=10,
                  after="", speed=0.03)] if lift.any() else []),
         Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=True, tolerance=0.04, limit=30, after="",
@@ -168,20 +149,6 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     yield [Phase(hand=hand, close=False, pos=back, limit=10, after=""), *travel(hand, way[-2::-1], None), *rest(hand)]
     detail = f"the hand closed on {name} and does not hold it" if reason == "no_grasp" else ""
     return reason or "slipped", detail
-
-
-def _way(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> list[Vector] | None:
-    """The hand's way to before a grasp, from where the robot stands; None: there is none."""
-    obstacles, spheres = world.obstacles([name]), world.spheres(pose.fingers, pose.palm)
-    follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles)
-    back = entries(pose, world.base[0])
-    return hand_path(obstacles, spheres, world.grip(hand), pose.at(pose.before), back, search=True, follows=follows)
-
-
-def entries(pose: GraspPose, xy: Sequence[float] | np.ndarray) -> list[Vector]:
-    """Directions from which a hand of a robot that stands at `xy` may come to a grasp: back to the robot, off the
-    object's side, up."""
-    return [-towards(xy, pose.point), -pose.palm, UP]
 
 
 def _plan(
@@ -268,6 +235,8 @@ def release(world: PlannedWorld, step: Step) -> Primitive:
     """Lowers what the hand holds as far as there is room, and opens the hand."""
     name = step.object
     hand = hand_with(world, name)
+    if holds_with_both(world, name):
+        return (yield from release_with_both(world, name))
     lowered = _lowered(world, name, hand) if not world.domain.fixed(name) else []
     at = world.grip(hand) if not lowered or lowered[-1].pos is None else np.array(lowered[-1].pos)
     off = vector3(at - RETREAT * world.hand_axes(hand)[1])

@@ -114,7 +114,7 @@ class KinematicRung:
         if not isinstance(body, HoveringBody | ArmBody):
             name = stage.scene.tables.agent_names[0]
             raise PlanningError(f"motion of the hands of robot '{name}' cannot be planned (the humanoid's can)")
-        self.body, self.domain = body, Domain(stage.model, len(body.hands))
+        self.body, self.domain = body, Domain(stage.model, len(body.hands), body.lifts)
         self._stage, self._seed, self._first = stage, seed, first
         self._query = query or SceneQuery(stage.scene)
         self._planner = planner or MotionPlanner(stage.scene)
@@ -228,7 +228,7 @@ class KinematicRung:
 
     def _move_hand(self, world: int, phase: Phase, step: Step) -> str:
         robot, hand = self._robots[world], phase.hand
-        base = self._base(robot)
+        base, before = self._base(robot), robot.hands[hand][0]
         if phase.reset:
             robot.hands[hand] = _of(base, _in(self._origin, self._rest[hand]))
         if phase.pos is not None or phase.quat is not None:
@@ -244,8 +244,12 @@ class KinematicRung:
                 robot.hands[hand] = grip - quat_rotate(quat, self.body.grips[hand]), quat
         if phase.until == Until.HELD:
             return self._take(world, hand, phase.object, step)
-        if phase.close is False and robot.held[hand]:
-            self._let_go(world, hand)
+        for other in range(len(robot.hands)) if phase.both else (hand,):
+            if other != hand:
+                pos, quat = robot.hands[other]
+                robot.hands[other] = pos + robot.hands[hand][0] - before, quat
+            if phase.close is False and robot.held[other]:
+                self._let_go(world, other)
         return ""
 
     def _carry_hand(self, robot: _Robot, grip: np.ndarray, quat: np.ndarray, phase: Phase) -> str:
@@ -274,7 +278,8 @@ class KinematicRung:
         query = self._symbolic.show(world)
         pos, quat = (np.asarray(a)[0, index].astype(float) for a in (query.view.object_pos, query.view.object_quat))
         robot.held[hand], robot.grasps[hand] = name, _in(robot.hands[hand], (pos, quat))
-        self._symbolic.hold(world, name)
+        if robot.held.count(name) == 1:
+            self._symbolic.hold(world, name)
         return ""
 
     def _let_go(self, world: int, hand: int) -> None:
@@ -283,6 +288,8 @@ class KinematicRung:
         name, grasp = robot.held[hand], robot.grasps[hand]
         assert grasp is not None
         robot.held[hand], robot.grasps[hand] = "", None
+        if name in robot.held:  # another hand holds it still
+            return
         query = self._symbolic.show(world)
         query.place(self.domain.index(name), *_of(robot.hands[hand], grasp))
         query.settle(SETTLE)

@@ -60,6 +60,8 @@ class Phase:
       limit: agent steps. after: reason of the failure where the limit passes first; "": the next phase begins.
       speed: m of the hand, or of the base where no hand moves, in an agent step.
       rise: m by which the body of a base that hovers is above its height; None: as it was.
+      both: the robot's other hands move by the same displacement, and close or open, as the one that acts does;
+        `keeps` is of all hands then, and all are to be empty.
     """
 
     base: Base = Base.STAY
@@ -80,6 +82,7 @@ class Phase:
     after: str = "timeout"
     speed: float | None = None
     rise: float | None = None
+    both: bool = False
 
 
 REASON_NUMBERS = ("", *REASONS)
@@ -112,6 +115,7 @@ class Programs:
     after: Int[np.ndarray, "W P"]
     speed: Float[np.ndarray, "W P"]
     rise: Float[np.ndarray, "W P"]
+    both: Int[np.ndarray, "W P"]
 
     @classmethod
     def pack(cls, programs: Sequence[Sequence[Phase]]) -> Programs:
@@ -144,6 +148,7 @@ class Programs:
             after=column(lambda p: REASON_NUMBERS.index(p.after), np.int32),
             speed=column(lambda p: p.speed or (HAND_SPEED if p.hand >= 0 else SPEED), np.float32),
             rise=column(lambda p: np.nan if p.rise is None else p.rise, np.float32),
+            both=column(lambda p: p.both, np.int32),
         )
 
     def with_rows(self, worlds: Int[np.ndarray, "k"], others: Programs) -> Programs:

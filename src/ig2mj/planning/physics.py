@@ -7,6 +7,7 @@ that have nothing to do stand still.
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
 from collections.abc import Callable, Sequence
 
@@ -80,7 +81,7 @@ class PhysicsRung:
         tables = stage.scene.tables
         links, bodies, count = tables.finger_hand, tables.graspable_object, tables.num_objects
         body.friction = FrictionHolds(links, bodies, count, body.hands) if stage.by_friction else None
-        self.domain = Domain(stage.model, len(body.hands))
+        self.domain = Domain(stage.model, len(body.hands), getattr(body, "lifts", math.inf))
         self._planner = planner or MotionPlanner(stage.scene, stage.agent)
         self._query = query
         self._seed = seed

@@ -41,6 +41,7 @@ from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.spots import Spot, grip_for, is_tipped, spots_for, spots_upon
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
+from ig2mj.planning.two_hands import place_with_both
 from ig2mj.planning.world import PlannedWorld, Stance, Vector
 from ig2mj.sampling.conditions import Condition
 
@@ -77,6 +78,8 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
     def place(world: PlannedWorld, step: Step) -> Primitive:
         name, where = step.arguments
         hand_with(world, name)
+        if world.domain.hands_for(name) > 1:
+            return (yield from place_with_both(world, predicate, step, until))
         turned_over, righted = not turns_over, predicate != "inside"
         reason, detail, opened = "no_base", "", Tried()
         for attempt in range(ATTEMPTS):

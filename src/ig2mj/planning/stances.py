@@ -88,8 +88,16 @@ def reaching_all(
 ) -> Stance | None:
     """The same place, with the body stretched or stooped as little as it takes that a hand reaches all of some points;
     None: there it does not, or has no room above it."""
-    shoulder = world.shoulder(hand, dataclasses.replace(stance, rise=0.0))
-    away, above = np.linalg.norm(points[:, :2] - shoulder[:2], axis=1), points[:, 2] - shoulder[2]
+    return reaching_with(world, stance, [(hand, point) for point in points], obstacles)
+
+
+def reaching_with(
+    world: PlannedWorld, stance: Stance, goals: Sequence[tuple[int, Vector]], obstacles: Obstacles
+) -> Stance | None:
+    """The same of several hands, each with a point, m."""
+    shoulders = np.array([world.shoulder(hand, dataclasses.replace(stance, rise=0.0)) for hand, _ in goals])
+    offset = np.array([point for _, point in goals]) - shoulders
+    away, above = np.linalg.norm(offset[:, :2], axis=1), offset[:, 2]
     if away.max() >= world.body.reach:
         return None
     span = np.sqrt(world.body.reach**2 - away**2)

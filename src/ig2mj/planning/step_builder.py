@@ -166,12 +166,12 @@ class StepBuilder:
         self._add("toggle_on" if value else "toggle_off", name)
         self._on[name] = value
 
-    def _free_hand(self, keep: str = "") -> None:
-        """Puts down what is held longest, where all hands are full."""
-        if len(self._held) < self._domain.hands:
-            return
-        name = next((n for n in self._held if n != keep), "")
-        if name:
+    def _free_hand(self, keep: str = "", hands: int = 1) -> None:
+        """Puts down what is held longest, where fewer hands are free."""
+        while self._domain.hands_taken(self._held) + hands > self._domain.hands:
+            name = next((n for n in self._held if n != keep), "")
+            if not name:
+                return
             self._add("release", name)
             self._held.remove(name)
 
@@ -181,7 +181,7 @@ class StepBuilder:
         self._reach(name)
         if self._failures(("grasp", name)):
             self._clear_out(self._loose_container(name))
-        self._free_hand()
+        self._free_hand(hands=self._domain.hands_for(name))
         self._add("grasp", name)
         self._held.append(name)
         self._inside[name] = ()

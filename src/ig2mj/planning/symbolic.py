@@ -144,11 +144,13 @@ class SymbolicRung:
         if kind == "grasp":
             if name in held:
                 return f"a hand holds {name} already"
-            if len(held) >= self._domain.hands:
+            if self._domain.hands_taken(held) >= self._domain.hands:
                 return f"the hands are full: {', '.join(held)}"
+            if self._domain.hands_taken((*held, name)) > self._domain.hands:
+                return f"both hands are needed for {name}, and they hold {', '.join(held)}"
             if self._domain.fixed(name):
                 return f"{name} is fixed"
-        if kind in ("open", "close", "push") and len(held) >= self._domain.hands:
+        if kind in ("open", "close", "push") and self._domain.hands_taken(held) >= self._domain.hands:
             return f"the hands are full: {', '.join(held)}"
         if (kind.startswith("place_") or kind in ("release", "soak")) and name not in held:
             return f"no hand holds {name}"

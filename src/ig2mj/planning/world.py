@@ -102,7 +102,9 @@ class PlannedWorld:
     @property
     def facts(self) -> Facts:
         """What holds now."""
-        return Facts(self.domain, self.stage.states, self.view, self.world, held=[n for n in self.held if n])
+        return Facts(
+            self.domain, self.stage.states, self.view, self.world, held=list(dict.fromkeys(n for n in self.held if n))
+        )
 
     @property
     def held(self) -> list[str]:

@@ -120,7 +120,7 @@ class RequestBench:
         self._sampler = make_sampler(bare)
         self._own_start = self._sampler.start
         body: Any = make_robot(robot)
-        self._domain = Domain(self._sampler.model, body.hand_count)
+        self._domain = Domain.of_robot(self._sampler.model, body)
         own = set(load_scene(home).object_names)
         wholes = np.flatnonzero(bare.tables.object_part_of < 0)
         kit = [name for o in wholes if (name := bare.tables.object_names[o]) not in own]

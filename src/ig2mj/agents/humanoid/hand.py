@@ -19,6 +19,9 @@ from ig2mj.agents.parts import GEOM, add_pulled_joints, collision, normalized, s
 HAND_FORCE = 300.0
 """N, and N m for turning, of each axis (paper, appendix A.1)."""
 
+HAND_LIFTS = 0.85 * HAND_FORCE / 9.81
+"""kg that a hand lifts and carries: the rest of its force is for its own weight and for speeding up."""
+
 FINGER_TORQUE = 3.0
 """N m of each finger joint."""
 

@@ -25,7 +25,7 @@ from ig2mj.agents.humanoid.frames import (
     TIP,
     mirrored,
 )
-from ig2mj.agents.humanoid.hand import add_hand
+from ig2mj.agents.humanoid.hand import HAND_LIFTS, add_hand
 from ig2mj.agents.parts import (
     GEOM,
     Vector,
@@ -111,6 +111,7 @@ class Humanoid(TaskRobot):
     look: str = "grey"
 
     stands = BODY_HEIGHT
+    hand_lifts = HAND_LIFTS
     hand_controls = tuple(_control(hand) for hand in HANDS)
 
     def __post_init__(self) -> None:

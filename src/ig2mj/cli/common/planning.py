@@ -59,4 +59,4 @@ def domain_of(problem: Problem, robot: str) -> Domain:
     from ig2mj.agents.registry import make_robot
     from ig2mj.planning.domain import Domain
 
-    return Domain(problem.model, make_robot(robot).hand_count)
+    return Domain.of_robot(problem.model, make_robot(robot))

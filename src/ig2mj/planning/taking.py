@@ -1,0 +1,64 @@
+"""How a hand comes to a grasp from where the robot stands, and closes there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ig2mj.planning.grasps import GraspPose
+from ig2mj.planning.moves import (
+    BELOW,
+    CLOSING,
+    COMING,
+    GRIPPING,
+    NEAR,
+    THIN,
+    TOUCHING,
+    UP,
+    Program,
+    hand_path,
+    towards,
+    travel,
+    vector3,
+)
+from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.world import PlannedWorld, Vector
+
+
+def closing_on(world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: Sequence[Vector]) -> Program:
+    """The hand goes along a way to before a grasp, on until it touches the object, and closes until it holds it."""
+    index, quat = world.index(name), world.body.turned(hand, pose.fingers, pose.palm)
+    deep, floats = vector3(pose.at(-BELOW)), world.body.opening is None
+    thin = floats and float(np.ptp(world.vertices(name) @ pose.palm)) < THIN
+    near = Phase(
+        hand=hand,
+        pos=vector3(pose.at(min(NEAR, pose.before))),
+        quat=quat,
+        tolerance=0.01,
+        limit=12,
+        after="",
+        speed=COMING,
+    )
+    return [
+        *travel(hand, way, quat),
+        *([near] if thin else []),
+        Phase(hand=hand, pos=deep, quat=quat, until=Until.TOUCHED, object=index, close=False, limit=25, after="",
+              speed=TOUCHING if thin else COMING),
+        Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15, after="no_grasp",
+              speed=CLOSING if floats else GRIPPING),
+    ]  # fmt: skip
+
+
+def way_to(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> list[Vector] | None:
+    """The hand's way to before a grasp, from where the robot stands; None: there is none."""
+    obstacles, spheres = world.obstacles([name]), world.spheres(pose.fingers, pose.palm)
+    follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles)
+    back = entries(pose, world.base[0])
+    return hand_path(obstacles, spheres, world.grip(hand), pose.at(pose.before), back, search=True, follows=follows)
+
+
+def entries(pose: GraspPose, xy: Sequence[float] | np.ndarray) -> list[Vector]:
+    """Directions from which a hand of a robot that stands at `xy` may come to a grasp: back to the robot, off the
+    object's side, up."""
+    return [-towards(xy, pose.point), -pose.palm, UP]
