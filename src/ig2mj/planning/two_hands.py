@@ -35,6 +35,7 @@ from ig2mj.planning.moves import (
     travel,
     vector3,
 )
+from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.spots import Spot, grip_for, spots_for
 from ig2mj.planning.stances import reaching_with
@@ -68,7 +69,7 @@ SLOW, LOWERING = 0.03, 0.02
 EXTENDED = (0.0, 0.15, 0.3, 0.45)
 """m that both hands move what they hold ahead of where it is carried, to put it down."""
 
-TILTED = 0.99
+TILTED = 0.95
 """Cosine of the turn of an object's vertical up to which a spot keeps it level: hands together do not tilt it."""
 
 SPOTS = 60
@@ -99,8 +100,11 @@ def grasp_with_both(world: PlannedWorld, name: str) -> Primitive:
     if others := [n for n in world.held if n]:
         return Outcome("no_grasp", f"both hands are needed for {name} ({mass:.0f} kg), and they hold {others[0]}")
     reason, detail, tried = "no_grasp", f"both hands find no room on opposite sides of {name}", list[_Pair]()
+    moved = Tried()
     for attempt in range(ATTEMPTS):
         found = _plan(world, name, tried)
+        while isinstance(found, str) and (yield from open_around(world, name, moved)):
+            found = _plan(world, name, tried)
         if isinstance(found, str):
             if not tried:
                 reason = found
@@ -323,6 +327,7 @@ def place_with_both(world: PlannedWorld, predicate: str, step: Step, until: str 
     reason, detail = "no_base", ""
     for attempt in range(ATTEMPTS):
         if not holds_with_both(world, name):
+            yield [phase for hand in (0, 1) for phase in _opened(world, hand)]
             again = yield from grasp_with_both(world, name)
             if not again.done:
                 return dataclasses.replace(again, attempts=attempt + 1)
