@@ -18,7 +18,6 @@ SRC = pathlib.Path(ig2mj.__file__).parent
 #: Questions that are asked of an engine outside of `engine`, and why.
 ALLOWED = {
     "envs/environment.py: .pure": "`Environment.pure` tells callers whether a step may be part of their program",
-    "cli/warm_up.py: WarpEngine": "compiles the kernels of the Warp engine that it has just made",
 }
 
 ENGINES = {"NativeEngine", "MjxEngine", "WarpEngine", "JaxEngine"}

@@ -174,7 +174,7 @@ def test_an_object_that_goes_on_rolling_forbids_nothing_and_goes_on(resting):
 
 
 def test_a_door_is_not_opened_into_a_robot(tiny_home_folder):
-    scene = ig2mj.load_scene(tiny_home_folder, agents=[Fetch(pos=(0.95, -0.15, 0.0))])
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[Fetch(pos=(0.9, -0.15, 0.0))])
     simulation = ig2mj.Simulation(scene)
     start = simulation.engine.export(simulation.physics, 0)
     before = np.array(simulation.view.agent.base_pos[0, 0])
