@@ -121,7 +121,7 @@ class PoseError(Ig2mjError):
 
 
 class StateError(Ig2mjError):
-    """A state or predicate that cannot be set, or not to this value."""
+    """A state, predicate or option of states that cannot be set, or not to this value."""
 
 
 class ActionError(Ig2mjError):

@@ -44,3 +44,14 @@ def test_a_home_takes_no_robot_and_no_grasping(capsys):
     assert "belong to environments" in capsys.readouterr().err
     assert call(["warm-up", "CookingMeat", "--arch", "90", "--randomize", "light"]) == 2
     assert "near matches: lights" in capsys.readouterr().err
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused_before_anything_is_made(tmp_path, capsys, monkeypatch):
+    from ig2mj.cli import call
+    from ig2mj.process.compilation import CACHE_VARIABLE
+
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
+    (tmp_path / "file").write_text("")
+    assert call(["warm-up", "CookingMeat", "--worlds", "1", "--out", str(tmp_path / "file" / "cache")]) == 2
+    assert "cannot be the folder of the cache" in capsys.readouterr().err
+    assert os.environ[CACHE_VARIABLE] == str(tmp_path)

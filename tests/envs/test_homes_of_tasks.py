@@ -12,6 +12,7 @@ import pytest
 import ig2mj
 from ig2mj.agents import Humanoid
 from ig2mj.engine.view import blank_view, replace_fields
+from ig2mj.envs import registry
 from ig2mj.errors import EngineError, InputError
 from ig2mj.scene.paths import scene_folder
 from ig2mj.scene.scene import load_scene
@@ -161,3 +162,11 @@ def test_a_home_of_ones_own_is_looked_at_each_time(monkeypatch, tmp_path):
     for home in (own, own, "maple", "maple"):
         relocation.relocated(task, home)
     assert asked == ["mine", "mine", "maple"]
+
+
+def test_all_homes_are_checked_before_the_first_is_made(monkeypatch):
+    made = []
+    monkeypatch.setattr(registry, "_make", lambda task, config: made.append(config.home))
+    with pytest.raises(InputError, match="no_home: there is no such scene"):
+        registry.make("GraspingBook", worlds=2, home=["small_home", "no_home"])
+    assert not made

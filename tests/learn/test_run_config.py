@@ -197,3 +197,13 @@ def test_the_guide_has_every_setting():
     configs = RunSettings(), OcclusionConfig(), SACConfig(), PPOConfig(), DaggerConfig(), BCConfig()
     names = {field.name for config in configs for field in dataclasses.fields(config)}
     assert not {name for name in names if f"`{name}`" not in page}
+
+
+def test_homes_are_a_set_of_homes_or_names_that_exist():
+    assert RunSettings(homes="train").varied == {"homes": "train"}
+    assert RunSettings(homes=" birch, small_home,").varied == {"homes": ["birch", "small_home"]}
+    for homes, near in (("trian", "train"), ("birch,wilow", "willow"), ("train,birhc", "train")):
+        with pytest.raises(UnknownNameError, match=near):
+            _ = RunSettings(homes=homes).varied
+    with pytest.raises(Ig2mjError, match="names no home"):
+        _ = RunSettings(homes=" , ").varied

@@ -73,6 +73,7 @@ def test_other_engines_feel_but_do_not_look(tiny_home_folder, monkeypatch):
         ({"depth_low": 3.0, "depth_high": 2.0}, "depth_low must be"),
         ({"scan_noise_rate": 1.5}, "a probability is between 0 and 1"),
         ({"scan_angle": 400.0}, "between 0 and 360 degrees"),
+        ({"particles": -1}, "particles = -1: at least 0"),
     ],
 )
 def test_settings_out_of_range_are_refused(setting, says):

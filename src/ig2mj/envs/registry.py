@@ -212,12 +212,18 @@ def make(
 
 
 def _make_several(task: AnyTask, config: EnvConfig, homes: tuple[str, ...]) -> HomesEnvironment:
-    """A task in several homes, worlds shared out evenly. Raises EngineError: there are fewer worlds than homes."""
+    """A task in several homes, worlds shared out evenly.
+
+    Raises:
+      EngineError: there are fewer worlds than homes. All that `in_home` raises of one of them.
+    """
     whole_number("worlds", config.worlds)
     if config.pool is not None:
         raise EngineError("a pool is of one home: several homes have start states of their own")
     if config.worlds < len(homes):
         raise EngineError(f"{config.worlds} worlds in {len(homes)} homes: give each home at least one (worlds=...)")
+    for home in homes:  # all are checked before the first takes the time of its start states
+        in_home(task, home)
     shares = [config.worlds // len(homes) + (k < config.worlds % len(homes)) for k in range(len(homes))]
     with made_together():
         made = [

@@ -24,6 +24,7 @@ from typing import Any
 
 import msgspec
 
+from ig2mj.envs.several_homes import HOMES
 from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
 from ig2mj.learn.algorithms import config_of
 from ig2mj.learn.bc import BCConfig
@@ -34,6 +35,13 @@ from ig2mj.scene.paths import shipped_homes
 from ig2mj.scene.scene import check_looks
 from ig2mj.sensors.base import CAMERA_LOOKS
 from ig2mj.worlds.randomize import Randomize
+
+
+def _checked_home(name: str) -> str:
+    """A home's name or folder. Raises UnknownNameError: there is no such home."""
+    if name not in (homes := shipped_homes()) and not pathlib.Path(name).exists():
+        raise UnknownNameError("home or set of homes", name, (*HOMES, *homes))
+    return name
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,12 +113,14 @@ class RunSettings:
 
     @property
     def varied(self) -> dict[str, Any]:
-        """Options of `make` for `homes` and `randomize`. Raises UnknownNameError: no such axis."""
+        """Options of `make` for `homes` and `randomize`. Raises UnknownNameError: no such home or axis; Ig2mjError."""
         found: dict[str, Any] = {}
         if self.homes:
-            names = self.homes.split(",")
-            is_home = names[0] in shipped_homes() or pathlib.Path(names[0]).exists()
-            found["homes"] = names if is_home or len(names) > 1 else names[0]  # `make` knows the sets of homes
+            names = [name for part in self.homes.split(",") if (name := part.strip())]
+            if not names:
+                raise Ig2mjError(f"homes={self.homes!r} names no home")
+            whole = len(names) == 1 and names[0] in HOMES
+            found["homes"] = names[0] if whole else [_checked_home(name) for name in names]
         if self.randomize:
             axes = Randomize.every() if self.randomize == "all" else Randomize.of(self.randomize.split(","))
             found["randomize"] = axes

@@ -10,7 +10,7 @@ import os
 import pathlib
 from collections.abc import Iterator, Mapping
 
-from ig2mj.errors import EngineError, MissingDependencyError
+from ig2mj.errors import EngineError, InputError, MissingDependencyError
 from ig2mj.process.compilation import (
     CACHE_VARIABLE,
     MIN_COMPILE_SECONDS,
@@ -94,8 +94,19 @@ def use_processor_only() -> None:
 
 
 def keep_compiled_in(folder: pathlib.Path) -> None:
-    """Compiled kernels and programs of this process are kept in this folder; before the first engine is made."""
-    os.environ[CACHE_VARIABLE] = str(folder.expanduser().resolve())
+    """Compiled kernels and programs of this process are kept in this folder; before the first engine is made.
+
+    Raises InputError: it is no folder that can be made and written to.
+    """
+    folder, fix = folder.expanduser().resolve(), "free some space, or name another folder"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as failure:
+        reason = failure.strerror or type(failure).__name__
+        raise InputError(folder, f"cannot be the folder of the cache: {reason}", fix=fix) from None
+    if not os.access(folder, os.W_OK):
+        raise InputError(folder, "cannot be the folder of the cache: it cannot be written to", fix=fix)
+    os.environ[CACHE_VARIABLE] = str(folder)
 
 
 def name_for_processes(variable: str, word: str, separator: str) -> None:

@@ -52,7 +52,8 @@ class SensorOptions:
       footprint: m, radius of the robot in the occupancy grid.
       lidar_beams: of the lidar, from 15 degrees below its horizon to 15 above. lidar_columns: rays of a beam in a
         quarter turn. lidar_near, lidar_far: m, its range; nearer is the robot's own head.
-      particles: the most particles of dust, stains and water that an image shows.
+      particles: the most particles of dust, stains and water that an image shows, and the most spots of substances
+        besides; 0: images show none of these, no contents, streams and flames.
       rows: the first row of images that is rendered, and the first below those; pixels of other rows read as if
         nothing were there, and cost nothing on a GPU. None: all rows.
       shadows: whether images have them; they cost six times the rest on the native engine, twice on a GPU.
@@ -105,6 +106,8 @@ class SensorOptions:
         small = [name for name in counts if getattr(self, name) < 1]
         if small:
             raise EngineError(f"{small[0]} = {getattr(self, small[0])}: at least 1 is needed")
+        if self.particles < 0:
+            raise EngineError(f"particles = {self.particles}: at least 0 is needed")
         for low, high in (("depth_low", "depth_high"), ("scan_near", "scan_far"), ("lidar_near", "lidar_far")):
             if not 0 <= getattr(self, low) < getattr(self, high):
                 raise EngineError(f"{low} must be 0 or more, and less than {high}")

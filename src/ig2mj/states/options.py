@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal
+import math
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from ig2mj.errors import StateError, UnknownNameError
 
 Compat = Literal["paper", "igibson"]
 
@@ -14,6 +19,9 @@ CONTROL_TIMESTEP = 1 / 30
 @dataclasses.dataclass(frozen=True)
 class StateOptions:
     """Choices, fixed for a run.
+
+    Raises:
+      UnknownNameError: no such `compat`. StateError: a value that its attribute cannot have.
 
     Attributes:
       compat: "paper", or "igibson" for the rule of iGibson's code where both differ (docs/design/rules.md).
@@ -36,7 +44,18 @@ class StateOptions:
     image_aspect: float = 1.0
 
     def __post_init__(self):
-        if self.compat not in ("paper", "igibson"):
-            raise ValueError(f"compat is 'paper' or 'igibson', not {self.compat!r}")
-        if not self.timestep > 0:
-            raise ValueError(f"the timestep must be positive, not {self.timestep}")
+        if self.compat not in (known := get_args(Compat)):
+            raise UnknownNameError("rules", str(self.compat), known)
+        for name in ("timestep", "image_aspect"):
+            if not (_is_finite(value := getattr(self, name)) and value > 0):
+                raise StateError(f"{name} = {value!r}: a number above 0 is needed")
+        for name in ("drying_rate", "contact_heat_rate"):
+            if not (_is_finite(value := getattr(self, name)) and value >= 0):
+                raise StateError(f"{name} = {value!r}: a number of at least 0 is needed")
+        for name in ("soiling", "occlusion"):
+            if not isinstance(value := getattr(self, name), bool | np.bool_):
+                raise StateError(f"{name} = {value!r}: True or False is needed")
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, float | int | np.number) and not isinstance(value, bool) and math.isfinite(value)
