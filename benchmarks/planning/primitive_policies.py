@@ -24,6 +24,7 @@ import multiprocessing
 import pathlib
 import sys
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,8 @@ from jaxtyping import Float, Int
 
 from benchmarks.harness.results import provenance
 from ig2mj.envs.primitives import PrimitiveEnv
-from ig2mj.envs.registry import make
+from ig2mj.envs.registry import find_task, make
+from ig2mj.errors import Ig2mjError
 from ig2mj.learn.evaluate import wilson
 from ig2mj.planning.steps import PlanningError, make_step
 from ig2mj.planning.task_planner import TaskPlanner
@@ -158,11 +160,17 @@ def labelled(env: PrimitiveEnv, policy: Policy, count: int, seed: int, first: in
 
 
 def train(activity: str, algorithm: str, count: int, seed: int) -> tuple[list[np.ndarray], Row]:
-    """Weights of a policy, and what its training reports."""
+    """Weights of a policy, and what its training reports.
+
+    Raises PlanningError: fewer than two demonstrations reach the goal, or all are learned from, or none is.
+    """
     env = make(f"activity/{activity}", action_space="primitives", rung="symbolic", split="train", pool_size=64)
     steps = demonstrations(env, count, seed)
     facts, action, episode = steps.arrays()
     own = episode % HELD_OUT != 0
+    if not own.any() or own.all():
+        got = len(set(episode.tolist()))
+        raise PlanningError(f"{activity}: {got} of {count} plans reach the goal, too few to learn from and to test on")
     tested = facts[~own], action[~own]
     agreement = []
 
@@ -200,18 +208,28 @@ def play(activity: str, weights: list[np.ndarray], row: int, rows: int) -> tuple
     return bool(info["success"]), float(info["q"]), count
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
     )
-    parser.add_argument("--activities", nargs="*", default=ACTIVITIES)
-    parser.add_argument("--algorithms", nargs="*", choices=ALGORITHMS, default=ALGORITHMS)
-    parser.add_argument("--demonstrations", type=int, default=100)
-    parser.add_argument("--episodes", type=int, default=20, help="held-out start states, each played once")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=pathlib.Path)
-    args = parser.parse_args()
+    parser.add_argument("--activities", nargs="+", default=ACTIVITIES, help=f"default: {' '.join(ACTIVITIES)}")
+    parser.add_argument("--algorithms", nargs="+", choices=ALGORITHMS, default=ALGORITHMS, help="default: both")
+    parser.add_argument("--demonstrations", type=int, default=100, help="planned episodes (default: 100)")
+    parser.add_argument(
+        "--episodes", type=int, default=20, help="held-out start states, each played once (default: 20)"
+    )
+    parser.add_argument("--jobs", type=int, default=1, help="processes (default: 1)")
+    parser.add_argument("--seed", type=int, default=0, help="of start states and networks (default: 0)")
+    parser.add_argument("--out", type=pathlib.Path, help="file of JSON lines to which rows are appended")
+    args = parser.parse_args(arguments)
+    for name, least in (("demonstrations", 2), ("episodes", 1), ("jobs", 1), ("seed", 0)):
+        if getattr(args, name) < least:
+            parser.error(f"--{name} {getattr(args, name)}: at least {least} is needed")
+    try:
+        for activity in args.activities:
+            find_task(f"activity/{activity}")
+    except Ig2mjError as error:
+        parser.error(str(error))
     with concurrent.futures.ProcessPoolExecutor(args.jobs, multiprocessing.get_context("spawn")) as pool:
         trained = {
             (activity, algorithm): pool.submit(train, activity, algorithm, args.demonstrations, args.seed)
