@@ -18,6 +18,7 @@ for another's kernels, and a log, OUT/NAME.log. Rows that programs write say how
 
 from __future__ import annotations
 
+import json
 import os
 import pathlib
 import subprocess
@@ -30,6 +31,13 @@ import msgspec
 import tyro
 
 from benchmarks.harness.paths import environment
+
+PINNED = """
+import json, os, sys
+os.sched_setaffinity(0, json.loads(sys.argv[1]))
+os.execvp("sh", ["sh", "-c", sys.argv[2]])
+"""
+"""Becomes a shell on some processors. A fork of this process could not do so where other threads compute in it."""
 
 
 class Job(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -83,11 +91,10 @@ def run_job(job: Job, out: pathlib.Path) -> int:
     """Runs a job to its end; its exit status, which is also the last line of its log."""
     with (out / f"{job.name}.log").open("w", encoding="utf-8") as log:
         status = subprocess.run(
-            ["sh", "-c", job.command.replace("OUT", str(out))],
+            [sys.executable, "-c", PINNED, json.dumps(processors_of(job)), job.command.replace("OUT", str(out))],
             env=environment_of(job, out),
             stdout=log,
             stderr=subprocess.STDOUT,
-            preexec_fn=lambda: os.sched_setaffinity(0, processors_of(job)),
             check=False,
         ).returncode
         log.write(f"exit status {status}\n")
