@@ -51,7 +51,10 @@ _PRIMITIVES = (
     Primitive(
         "navigate_to", ("object",), "a path over free floor", "the robot stands where its hands reach the object"
     ),
-    Primitive("grasp", ("object",), "a free hand; the object is not shut in", "a hand holds the object"),
+    Primitive(
+        "grasp", ("object",), "a free hand, or both for what one does not lift; the object is not shut in",
+        "a hand holds the object, or both do",
+    ),
     Primitive(
         "place_on_top", ("object", "support"), "the object is in a hand", "on_top(object, support)",
         (("on_top", "?0", "?1"),),
