@@ -10,6 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ig2mj.agents.task_robot import TaskRobot
+from ig2mj.knowledge.substances import WATER
 from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.registry import find
@@ -135,6 +136,19 @@ class Domain:
         names = self.model.tables.object_names
         return tuple(dict.fromkeys(names[o] for o in self.model.parameters.water_object))
 
+    def contains(self, name: str) -> bool:
+        """Whether an object is a container of substances; False where the scene has none in use."""
+        found = self.model.substances
+        return found is not None and found.containers.row_of(self.index(name)) is not None
+
+    @functools.cached_property
+    def fillable(self) -> tuple[str, ...]:
+        """Containers that can be carried, where water is in use and comes from somewhere."""
+        found = self.model.substances
+        if found is None or found.water < 0 or not self.taps:
+            return ()
+        return tuple(n for n in self.loose if self.contains(n) and self.graspable(n))
+
     @functools.cached_property
     def sources(self) -> tuple[HeatSource, ...]:
         """Sources of heat and cold."""
@@ -181,7 +195,24 @@ class Domain:
             return ""
         if predicate.ability is not None and not self.has(name, predicate.ability):
             return f"'{name}' is not {predicate.ability}" if value else ""
+        if condition.predicate in ("filled", "contains"):
+            return self._unfillable(name, condition.arguments[1], value)
         return self._unchangeable(condition.predicate, name, value)
+
+    def _unfillable(self, name: str, substance: str, value: bool) -> str:
+        """Why no primitive fills a container with a substance, or takes it out."""
+        substances = self.model.substances
+        if not value:
+            return f"no primitive takes {substance} out of '{name}'"
+        if substance != WATER:
+            return f"primitives fill containers with {WATER} only"
+        if substances is None or substances.water < 0:
+            return f"the scene has no {WATER} in use (--substances {WATER})"
+        if not self.contains(name):
+            return f"'{name}' is no container"
+        if not self.taps:
+            return f"the scene has no {WATER} that runs"
+        return "" if name in self.fillable else f"'{name}' cannot be carried to {WATER}"
 
     def _mover(self, condition: Condition) -> str | None:
         """The object to be moved so that a placement becomes true: the first argument, or where that is fixed and the
@@ -244,8 +275,11 @@ _CHANGES = {
     "sliced": True,
     "cooked": True,
     "frozen": True,
+    "filled": True,
+    "contains": True,
 }
-"""Predicates of one object that primitives change, and to what (open and toggled_on both ways)."""
+"""Predicates of one object, or of a container and a substance, that primitives change, and to what (open and toggled_on
+both ways)."""
 
 SYMMETRIC = ("next_to", "in_contact_with")
 """Relations that hold both ways, so that either object may be moved."""

@@ -36,6 +36,7 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
         "wipe": [n for n in things if domain.has(n, "dustyable")],
         "scrub": [n for n in things if domain.has(n, "stainable")],
         "soak": [n for n in loose if domain.has(n, "soakable")],
+        "fill": [n for n in loose if n in domain.fillable],
         "slice": [n for n in things if domain.has(n, "sliceable")],
         "cook": [n for n in loose if domain.has(n, "cookable")],
         "freeze": [n for n in loose if domain.has(n, "freezable")],
@@ -45,6 +46,7 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
         "wipe": domain.tools,
         "scrub": [t for t in domain.tools if domain.has(t, "soakable")],
         "soak": domain.taps,
+        "fill": domain.taps,
         "slice": domain.knives,
     }
     for primitive, kind in PRIMITIVES.items():

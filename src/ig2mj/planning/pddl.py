@@ -10,6 +10,7 @@ from __future__ import annotations
 import pathlib
 from collections.abc import Iterable, Sequence
 
+from ig2mj.knowledge.substances import WATER
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.steps import PLACE
 from ig2mj.planning.task_planner import TaskPlan
@@ -19,13 +20,15 @@ from ig2mj.sampling.conditions import Condition
 DOMAIN = """\
 (define (domain ig2mj)
   (:requirements :adl)
-  (:types thing room hand)
+  (:types thing room hand substance)
+  (:constants water - substance)
   (:predicates
     (free ?h - hand) (in_hand ?o - thing ?h - hand) (held ?o - thing)
     (inside ?o ?c - thing) (on_top ?o ?s - thing) (under ?o ?s - thing) (next_to ?o ?s - thing)
     (in_contact_with ?o ?s - thing) (on_floor ?o - thing ?r - room)
     (open ?o - thing) (toggled_on ?o - thing) (soaked ?o - thing) (dusty ?o - thing) (stained ?o - thing)
     (sliced ?o - thing) (cooked ?o - thing) (frozen ?o - thing)
+    (filled ?o - thing ?l - substance) (contains ?o - thing ?l - substance) (container ?o - thing)
     (openable ?o - thing) (switched ?o - thing) (tool ?o - thing) (knife ?o - thing) (tap ?o - thing)
     (heats ?s ?o - thing) (cools ?s ?o - thing) (acts_inside ?s - thing) (needs_switch ?s - thing)
     (needs_closed ?s - thing))
@@ -65,6 +68,9 @@ DOMAIN = """\
   (:action soak :parameters (?o ?s - thing)
     :precondition (and (tap ?s) (held ?o) (or (toggled_on ?s) (not (switched ?s))))
     :effect (soaked ?o))
+  (:action fill :parameters (?o ?s - thing)
+    :precondition (and (tap ?s) (container ?o) (held ?o) (or (toggled_on ?s) (not (switched ?s))))
+    :effect (and (filled ?o water) (contains ?o water)))
   (:action scrub :parameters (?o ?t - thing)
     :precondition (and (tool ?t) (held ?t) (soaked ?t))
     :effect (not (stained ?o)))
@@ -125,6 +131,7 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
     for word, ability in (("switched", "toggleable"), ("tool", "cleaningTool"), ("knife", "slicer")):
         lines += [f"({word} {n})" for n in things if domain.has(n, ability)]
     lines += [f"(tap {n})" for n in things if n in domain.taps]
+    lines += [f"(container {n})" for n in things if domain.contains(n)]
     for source in (s for s in domain.sources if s.name in things):
         lines += [f"(heats {source.name} {n})" for n in things if source in domain.heaters(n)]
         lines += [f"(cools {source.name} {n})" for n in things if source in domain.coolers(n)]
@@ -132,6 +139,7 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
         flags["needs_closed"] = source.needs_closed and domain.opens(source.name)
         lines += [f"({word} {source.name})" for word, is_so in flags.items() if is_so]
     goal = [str(c) for c in conditions]
+    others = {a for c in conditions for a in c.arguments if a not in c.objects} - {WATER}  # a constant of the domain
     return "\n".join(
         [
             *(f"; {k + 1}. {step}" for k, step in enumerate(plan.steps)),
@@ -140,6 +148,7 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
             f"  (:objects {' '.join(hands)} - hand",
             *([f"    {' '.join(things)} - thing"] if things else []),
             *([f"    {' '.join(rooms)} - room"] if rooms else []),
+            *([f"    {' '.join(sorted(others))} - substance"] if others else []),
             "  )",
             *_section(":init", lines),
             *_section(":goal (and", goal, "))"),

@@ -13,6 +13,7 @@ from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.cleaning import clean
 from ig2mj.planning.doors import through_doors
 from ig2mj.planning.driving import drive_near, go
+from ig2mj.planning.filling import fill
 from ig2mj.planning.grasping import grasp, is_graspable, release
 from ig2mj.planning.moves import Primitive, PrimitiveFailed
 from ig2mj.planning.opening import set_open
@@ -86,6 +87,7 @@ ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {
     "wipe": clean("dusty"),
     "scrub": clean("stained"),
     "soak": soak,
+    "fill": fill,
     "slice": slice_,
     "cook": cook,
     "freeze": freeze,

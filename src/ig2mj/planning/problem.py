@@ -16,13 +16,17 @@ import numpy as np
 
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import UnknownNameError
+from ig2mj.knowledge.substances import substances
 from ig2mj.planning.steps import PlanningError
+from ig2mj.predicates import logic
 from ig2mj.predicates.compile import CompiledExpression, compile_expression
 from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.predicates.literals import AbilityWarning
 from ig2mj.predicates.logic import Expression
+from ig2mj.predicates.parse import parse
 from ig2mj.scene.paths import SHIPPED_HOMES
 from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.scene.substance_requests import substances_as_text
 from ig2mj.states.model import StateModel
 from ig2mj.tasks.bddl.definitions import activity_names
 from ig2mj.tasks.bddl.goal import conditions
@@ -90,7 +94,8 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = (), 
 
     Args:
       what: an activity of BEHAVIOR or of the paper, a home that ships, or a folder of a scene.
-      goal: expression; None: that of the activity. objects: what is added to a home, and changed in it (`load_scene`).
+      goal: expression; None: that of the activity. Substances that it wants in containers are in use.
+      objects: what is added to a home, and changed in it (`load_scene`).
       home: of an activity of BEHAVIOR, in place of its own; None: its own.
 
     Raises:
@@ -123,10 +128,17 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = (), 
         except Exception:
             raise UnknownNameError("activity", what, [*activity_names(), *TASKS]) from None
         raise PlanningError(f'{what} is a scene: give a goal, such as "(inside apple_0 fridge_0)"')
+    objects = [*objects, *substances_as_text(_filling(goal))]
     scene = load_scene(what, objects=objects)
     model = StateModel.of_manifest(scene.tables, scene.manifest)
     own = scene.name if scene.folder.parent == SHIPPED_HOMES else scene.folder.resolve()
     return Problem(scene.name, scene, model, _compiled(model, goal), goal_task(own, goal), tuple(objects))
+
+
+def _filling(goal: str) -> list[str]:
+    """Substances that a goal wants in containers. Raises ExpressionError, UnknownNameError as `compile_expression`."""
+    found = [a.arguments[-1] for a in logic.atoms(parse(goal)) if a.predicate in ("filled", "contains")]
+    return list(dict.fromkeys(name for name in found if name in substances()))
 
 
 def _compiled(model: StateModel, goal: str | Expression) -> CompiledExpression:

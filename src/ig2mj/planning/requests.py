@@ -81,6 +81,7 @@ class RequestSource:
         able |= {"wipe": self._with("dustyable"), "scrub": self._with("stainable"), "navigate_to": self._things}
         first = {
             "soak": [n for n in self._loose if domain.has(n, "soakable")] + [self._rag],
+            "fill": [n for n in self._loose if n in domain.fillable],
             "slice": [n for n in self._loose if domain.has(n, "sliceable")] + [self._fruit],
             "cook": [n for n in self._loose if domain.has(n, "cookable")] + [self._meat],
             "freeze": [n for n in self._loose if domain.has(n, "freezable")] + [self._fruit],
@@ -98,6 +99,7 @@ class RequestSource:
             "scrub": [self._rag],
             "slice": [self._knife],
             "soak": domain.taps,
+            "fill": domain.taps,
         }
         if primitive in ("cook", "freeze"):
             sources = domain.heaters(name) if primitive == "cook" else domain.coolers(name)
@@ -134,7 +136,7 @@ class RequestSource:
             return [true("stained", name), true("soaked", second)], (second,)
         if primitive == "slice":
             return [], (second,)
-        if primitive == "soak":
+        if primitive in ("soak", "fill"):
             return self._running(second), (name,)
         if primitive in ("cook", "freeze"):
             source = next(s for s in self._domain.sources if s.name == second)

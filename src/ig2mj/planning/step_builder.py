@@ -1,7 +1,8 @@
 """`StepBuilder`: the steps that make the literals of a reading true in one world, with what they need first.
 
-What shuts an object in is opened, a tap runs before a tool is soaked, a tool is soaked before it scrubs, a knife is
-taken before it cuts, hands that are full put something down. Steps that failed choose another tool, tap or support.
+What shuts an object in is opened, a tap runs before a tool is soaked or a container filled, a tool is soaked before it
+scrubs, a knife is taken before it cuts, hands that are full put something down. Steps that failed choose another tool,
+tap or support.
 """
 
 from __future__ import annotations
@@ -71,6 +72,8 @@ class StepBuilder:
         elif c.predicate == "soaked":
             for part in self._parts(name, c):
                 self._soak(part)
+        elif c.predicate in ("filled", "contains"):
+            self._fill(name)
         elif c.predicate == "cooked":
             for part in self._parts(name, c):
                 self._cook(part)
@@ -217,13 +220,21 @@ class StepBuilder:
             self._inside[name] = (where, *(self._inside.get(where) or ()))
 
     def _soak(self, name: str) -> None:
+        self._hold_below_tap("soak", name)
+        self._wet.add(name)
+
+    def _fill(self, name: str) -> None:
+        """Fills a container, once where several conditions ask for it."""
+        if not any(s.primitive == "fill" and s.object == name for s in self.steps):
+            self._hold_below_tap("fill", name)
+
+    def _hold_below_tap(self, primitive: str, name: str) -> None:
         taps = self._domain.taps
         far = {t: float(np.linalg.norm(self._facts.place(t) - self._facts.place(name))) for t in taps}
-        tap = min(taps, key=lambda t: (self._failures(("toggle_on", t), ("soak", name, t)), far[t]))
+        tap = min(taps, key=lambda t: (self._failures(("toggle_on", t), (primitive, name, t)), far[t]))
         self._switch(tap, True, keep=name)
         self._take(name)
-        self._add("soak", name, tap)
-        self._wet.add(name)
+        self._add(primitive, name, tap)
 
     def _cook(self, name: str) -> None:
         source = self._source("cook", name, self._domain.heaters(name))

@@ -37,7 +37,7 @@ class Primitive:
 
     Attributes:
       name: verb. arguments: what each argument is. before: what must hold first. until: what ends it with success.
-      adds: conditions that hold afterwards, with `?0`, `?1` for the arguments.
+      adds: conditions that hold afterwards, with `?0`, `?1` for the arguments, and names of substances.
     """
 
     name: str
@@ -45,6 +45,11 @@ class Primitive:
     before: str
     until: str
     adds: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def makes(self) -> tuple[str, ...]:
+        """Predicates of the conditions that hold afterwards, or are false."""
+        return tuple(template[template[0] == "not"] for template in self.adds)
 
 
 _PRIMITIVES = (
@@ -89,6 +94,10 @@ _PRIMITIVES = (
     Primitive(
         "scrub", ("object", "tool"), "the soaked cleaning tool is in a hand", "not stained(object)",
         (("not", "stained", "?0"),),
+    ),
+    Primitive(
+        "fill", ("object", "source"), "the object, a container, is in a hand; the water runs", "filled(object, water)",
+        (("filled", "?0", "water"),),
     ),
     Primitive("slice", ("object", "knife"), "the knife is in a hand", "sliced(object)", (("sliced", "?0"),)),
     Primitive(
@@ -146,8 +155,11 @@ class Step:
         for template in PRIMITIVES[self.primitive].adds:
             value = template[0] != "not"
             name, *places = template if value else template[1:]
-            found.append(Condition(name, tuple(self.arguments[int(p[1:])] for p in places), value))
+            found.append(Condition(name, tuple(map(self._argument, places)), value))
         return (*found, *(c for c in self.also if c not in found))
+
+    def _argument(self, word: str) -> str:
+        return self.arguments[int(word[1:])] if word.startswith("?") else word
 
     def __str__(self) -> str:
         return " ".join((self.primitive, *self.arguments))

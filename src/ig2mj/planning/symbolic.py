@@ -152,13 +152,19 @@ class SymbolicRung:
                 return f"{name} is fixed"
         if kind in ("open", "close", "push") and self._domain.hands_taken(held) >= self._domain.hands:
             return f"the hands are full: {', '.join(held)}"
-        if (kind.startswith("place_") or kind in ("release", "soak")) and name not in held:
+        if (kind.startswith("place_") or kind in ("release", "soak", "fill")) and name not in held:
             return f"no hand holds {name}"
         if kind in ("wipe", "scrub", "slice") and second not in held:
             return f"no hand holds {second}"
         if kind == "scrub" and not facts.holds("soaked", second):
             return f"{second} is not soaked"
-        if kind == "soak" and self._domain.has(second, "toggleable") and not facts.holds("toggled_on", second):
+        if kind == "fill" and (why := self._domain.impossible(step.adds[0])):
+            return why
+        if (
+            kind in ("soak", "fill")
+            and self._domain.has(second, "toggleable")
+            and not facts.holds("toggled_on", second)
+        ):
             return f"{second} is not toggled on"
         if kind == "place_inside" and self._domain.opens(second) and not facts.holds("open", second):
             return f"{second} is not open"

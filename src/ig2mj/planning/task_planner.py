@@ -33,6 +33,8 @@ STEPS_OF = {
     "sliced": 2.0,
     "dusty": 2.5,
     "soaked": 3.0,
+    "contains": 3.0,
+    "filled": 3.0,
     "cooked": 4.0,
     "frozen": 4.0,
     "stained": 4.5,

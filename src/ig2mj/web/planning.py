@@ -256,6 +256,8 @@ def offers(domain: Domain, name: str, held: Sequence[str]) -> dict[str, tuple[st
         found[f"Slice with {tool}"] = ("slice", name, tool)
     if domain.has(tool, "soakable") and domain.has(name, "waterSource"):
         found[f"Soak {tool}"] = ("soak", tool, name)
+    if tool in domain.fillable and domain.has(name, "waterSource"):
+        found[f"Fill {tool}"] = ("fill", tool, name)
     if domain.has(tool, "cookable") and domain.has(name, "heatSource"):
         found[f"Cook {tool}"] = ("cook", tool, name)
     return {text: words for text, words in found.items() if words[0] in PRIMITIVES}

@@ -6,6 +6,7 @@ import dataclasses
 import re
 from collections.abc import Sequence
 
+from ig2mj.knowledge.substances import WATER
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.steps import PRIMITIVES, Step, make_step
 from ig2mj.planning.words.instruction import Instruction
@@ -202,7 +203,7 @@ class _Clauses:
 
     def _each(self, primitive: str, phrases: Sequence[Phrase]) -> None:
         """A primitive of one argument on each object, those that can be so."""
-        predicate = PRIMITIVES[primitive].adds[0][-2] if PRIMITIVES[primitive].adds else ""
+        predicate = next(iter(PRIMITIVES[primitive].makes), "")
         for name in self._names(phrases, predicate):
             if predicate and (reason := self.domain.impossible(Condition(predicate, (name,), True))):
                 raise NotUnderstoodError(f"cannot {primitive} {name}: {reason}")
@@ -245,9 +246,11 @@ class _Clauses:
         if kind in PRIMITIVES and len(PRIMITIVES[kind].arguments) == 1:
             self._each(kind, objects)
             return
-        names = self._names(objects, PRIMITIVES[kind].adds[0][-2] if kind in ("cook", "freeze", "slice") else "")
+        names = self._names(objects, PRIMITIVES[kind].makes[0] if kind in ("cook", "freeze", "slice") else "")
         self._fillers()
         reader.take("clean", "dry")
+        if kind == "fill":
+            reader.take(f"with {WATER}")
         said = self._with(kind)
         for name in names:
             self.steps.append(treatment(self.lexicon.facts, kind, name, said))
@@ -259,7 +262,7 @@ class _Clauses:
         reader = self.reader
         if kind in ("wipe", "scrub", "clean", "slice") and reader.take(*tools):
             return self._names(self._objects("a tool", single=True))[0]
-        if kind in ("cook", "freeze", "soak") and reader.take(*places):
+        if kind in ("cook", "freeze", "soak", "fill") and reader.take(*places, "from"):
             return self._names(self._objects("a place", single=True))[0]
         return ""
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
-from ig2mj.planning.steps import PRIMITIVES, Step, make_step
+from ig2mj.planning.steps import Step, make_step
 from ig2mj.planning.words.nouns import NotUnderstoodError
-from ig2mj.sampling.conditions import Condition
 
 
 def treatment(facts: Facts, kind: str, name: str, tool: str) -> Step:
@@ -21,8 +20,7 @@ def treatment(facts: Facts, kind: str, name: str, tool: str) -> Step:
     domain = facts.domain
     if kind in ("clean", "wipe"):
         kind = _cleaning(facts, kind, name)
-    predicate = PRIMITIVES[kind].adds[0][-2]
-    wish = Condition(predicate, (name,), PRIMITIVES[kind].adds[0][0] != "not")
+    (wish,) = Step(kind, (name, tool)).adds
     if reason := domain.impossible(wish):
         raise NotUnderstoodError(f"cannot {kind} {name}: {reason}")
     tools = {
@@ -30,6 +28,7 @@ def treatment(facts: Facts, kind: str, name: str, tool: str) -> Step:
         "scrub": _brushes(domain),
         "slice": domain.knives,
         "soak": domain.taps,
+        "fill": domain.taps,
         "cook": tuple(s.name for s in domain.heaters(name)) if kind == "cook" else (),
         "freeze": tuple(s.name for s in domain.coolers(name)) if kind == "freeze" else (),
     }[kind]

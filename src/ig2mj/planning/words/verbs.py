@@ -20,6 +20,7 @@ _WORDS = {
     "scrub": "scrub|wash|wash up|scour",
     "clean": "clean|clean up",
     "soak": "soak|wet|rinse|moisten|dampen",
+    "fill": "fill|fill up",
     "slice": "slice|cut|cut up|chop|chop up|halve",
     "cook": "cook|fry|bake|roast|boil|grill",
     "freeze": "freeze",
@@ -48,6 +49,7 @@ ADJECTIVES = {
     "cut": "slice",
     "wet": "soak",
     "soaked": "soak",
+    "filled": "fill",
     "clean": "clean",
 }
 """Adjectives after "make (sure)" -> the kind of the verb that makes it so."""
