@@ -364,7 +364,7 @@ class HoveringBody(_Body):
         heading = np.where(mode == Base.DRIVE, np.arctan2(offset[:, 1], offset[:, 0]), rows["yaw"])
         left = _wrapped(heading - senses.yaw)
         left = np.where((mode == Base.STAY) | ((mode == Base.DRIVE) & (apart < AT_ONCE)), 0.0, left)
-        together = senses.held.all(1).any(1)  # all hands hold the same
+        together = np.any(np.all(senses.held, axis=1), axis=1)  # all hands hold the same
         moves = (mode == Base.SHIFT) | ((mode == Base.DRIVE) & (np.abs(left) < AHEAD))
         speed = np.where(rows["hand"] >= 0, SPEED_OF_BASE, rows["speed"])
         speed = np.where(together, np.minimum(speed, TOGETHER[0]), speed)
