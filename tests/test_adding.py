@@ -46,7 +46,7 @@ LINES = {
     ],
     "ig2mj/planning/steps.py": [
         (
-            '    Primitive("grasp"',
+            '    Primitive("release"',
             '    Primitive("lift", ("object",), "the object is in a hand", "it is 0.1 m higher"),\n',
         )
     ],
