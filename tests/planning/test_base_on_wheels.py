@@ -8,8 +8,9 @@ import pytest
 from ig2mj.engine.view import PhysicsView
 from ig2mj.planning import execution
 from ig2mj.planning.arms import FETCH_CARRYING
-from ig2mj.planning.bodies import MOST, Senses, WheeledBody
+from ig2mj.planning.bodies import MOST, WheeledBody
 from ig2mj.planning.phases import Base, Phase
+from ig2mj.planning.senses import Senses
 
 
 @pytest.fixture

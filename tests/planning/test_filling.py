@@ -1,27 +1,97 @@
-"""Containers are filled with water below a tap: what is planned, and what is refused."""
+"""Containers are filled with water below a tap: what is planned, said and offered, and what is refused."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+import ig2mj
 from ig2mj.cli.common.planning import domain_of, expression_of
+from ig2mj.errors import AbilityError
+from ig2mj.planning.domain import Domain
+from ig2mj.planning.grounding import ground_steps
+from ig2mj.planning.pddl import write_pddl
 from ig2mj.planning.problem import problem_of
-from ig2mj.planning.steps import PlanningError
+from ig2mj.planning.requests import RequestSource
+from ig2mj.planning.steps import PlanningError, Step
 from ig2mj.planning.symbolic import start_facts
 from ig2mj.planning.task_planner import TaskPlanner
+from ig2mj.predicates.literals import AbilityWarning, resolve
+from ig2mj.predicates.logic import Atom
+from ig2mj.sampling.conditions import Condition
+from ig2mj.states.model import StateModel
+from ig2mj.web.planning import offers
+
+WET = Condition("filled", ("bowl_0", "water"))
 
 
-def planned(goal: str) -> list[str]:
+def domain(*objects: str) -> Domain:
+    scene = ig2mj.load_scene("small_home", objects=objects)
+    return Domain(StateModel.of_manifest(scene.tables, scene.manifest))
+
+
+def planned(goal: str, folder=None) -> list[str]:
     problem = problem_of("small_home", expression_of("small_home", goal, (), "humanoid"), ())
-    domain = domain_of(problem, "humanoid")
-    facts = start_facts(domain, problem.scene, problem.pool("held_out", 1), 0)
-    return [step.primitive for step in TaskPlanner(domain, problem.goal).plan(facts).steps]
+    known = domain_of(problem, "humanoid")
+    facts = start_facts(known, problem.scene, problem.pool("held_out", 1), 0)
+    plan = TaskPlanner(known, problem.goal).plan(facts)
+    if folder is not None:
+        write_pddl(folder, problem.name, facts, plan)
+    return [str(step) for step in plan.steps]
 
 
-def test_a_bowl_is_filled_below_a_tap_that_runs():
-    assert planned("(filled bowl_0 water)") == ["toggle_on", "grasp", "fill"]
+@pytest.mark.parametrize("goal", ["(filled bowl_0 water)", "(contains bowl_0 water)", "fill the bowl with water"])
+def test_a_bowl_is_filled_below_a_tap_that_runs(goal):
+    assert planned(goal) == ["toggle_on sink_0", "grasp bowl_0", "fill bowl_0 sink_0"]
 
 
-def test_what_no_primitive_fills_is_refused_with_the_reason():
-    with pytest.raises(PlanningError, match="with water only"):
-        planned("(filled bowl_0 milk)")
+def test_water_that_is_in_use_already_is_so_once():
+    problem = problem_of("small_home", "(filled bowl_0 water)", ("substances:water",))
+    assert problem.model.substances is not None and problem.model.substances.names.count("water") == 1
+
+
+def test_an_exported_plan_has_the_action_and_water_as_a_constant(tmp_path):
+    planned("(filled bowl_0 water)", tmp_path)
+    text = (tmp_path / "domain.pddl").read_text()
+    assert "(:constants water - substance)" in text and "(:action fill" in text
+    assert "(filled bowl_0 water)" in (tmp_path / "problem.pddl").read_text()
+
+
+@pytest.mark.parametrize(
+    ("goal", "said"),
+    [
+        ("(filled bowl_0 milk)", "with water only"),
+        ("(filled sofa_0 water)", "'sofa_0' is no container"),
+    ],
+)
+def test_what_no_primitive_does_is_refused_with_the_reason(goal, said):
+    with pytest.raises(PlanningError, match=said):
+        planned(goal)
+
+
+def test_where_no_water_is_in_use_the_reason_names_the_option():
+    assert "--substances water" in domain().impossible(WET)
+    known = domain("substances:water")
+    assert known.impossible(WET) == ""
+    assert "takes water out" in known.impossible(Condition("contains", ("bowl_0", "water"), False))
+
+
+def test_pages_offer_it_and_requests_and_ground_steps_have_it():
+    known = domain("substances:water")
+    assert offers(known, "sink_0", ("bowl_0",))["Fill bowl_0"] == ("fill", "bowl_0", "sink_0")
+    assert "Fill apple_0" not in offers(known, "sink_0", ("apple_0",))
+    problem = problem_of("small_home", "(filled bowl_0 water)")
+    assert Step("fill", ("bowl_0", "sink_0")) in set(ground_steps(domain_of(problem, "humanoid"), problem))
+    source = RequestSource(known, (*known.tools[:1], *known.knives[:1], "apple_0", "fish_0"))
+    drawn = [source.draw("fill", np.random.default_rng(seed)) for seed in range(20)]
+    taken = {request.step.arguments[0] for request in drawn if request is not None}
+    assert taken and taken <= set(known.fillable)
+
+
+def test_a_goal_that_asks_it_of_what_is_no_container_warns_or_is_refused():
+    model = domain("substances:water").model
+    with pytest.warns(AbilityWarning, match="'coffee_table_0': it is no container of substances"):
+        assert not resolve(model, Atom("filled", ("coffee_table_0", "water"))).able
+    with pytest.raises(AbilityError, match="no container"):
+        resolve(model, Atom("contains", ("sofa_0", "water")), strict=True)
+    assert resolve(model, Atom("filled", ("bowl_0", "water"))).able

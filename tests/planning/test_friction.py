@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ig2mj.planning.bodies import FrictionHolds
+from ig2mj.planning.senses import FrictionHolds
 
 
 def test_a_hand_holds_what_two_links_of_its_fingers_press_on():

@@ -10,12 +10,12 @@ import ig2mj
 from ig2mj.agents.fetch import Fetch
 from ig2mj.agents.humanoid import Humanoid
 from ig2mj.planning import execution
-from ig2mj.planning.bodies import Senses
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.kinematic import kinematic_episodes
 from ig2mj.planning.phases import Phase, Programs, Until
 from ig2mj.planning.problem import problem_of
+from ig2mj.planning.senses import Senses
 from ig2mj.planning.steps import make_step
 from ig2mj.planning.symbolic import SymbolicRung
 from ig2mj.planning.task_planner import TaskPlanner

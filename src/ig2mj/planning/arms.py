@@ -37,9 +37,10 @@ from ig2mj.geometry.host_rotations import (
 )
 from ig2mj.planning.arm_links import LinkSpheres, geom_spheres
 from ig2mj.planning.arm_model import FASTEST, PULL, TURN_FASTEST, ArmModel
-from ig2mj.planning.bodies import Direction, Rows, Senses, WheeledBody, goals_of_hand, grip_of
+from ig2mj.planning.bodies import Direction, Rows, WheeledBody, goals_of_hand
 from ig2mj.planning.clearance import HELD, Obstacles
 from ig2mj.planning.phases import Base, Phase
+from ig2mj.planning.senses import Senses, grip_of
 from ig2mj.scene.scene import Scene
 
 UP, FORWARDS = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])

@@ -13,13 +13,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from ig2mj.agents.base import Controller
 from ig2mj.agents.humanoid.frames import BODY_HEIGHT, HAND_POS, HAND_QUAT, HAND_REACH, SHOULDER_POS
 from ig2mj.agents.humanoid.robot import BODY_RADIUS
 from ig2mj.agents.task_robot import HandControl, TaskRobot
-from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.host_rotations import (
     cross,
     length,
@@ -32,6 +31,7 @@ from ig2mj.geometry.host_rotations import (
 )
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.phases import Base, Phase, Until
+from ig2mj.planning.senses import FrictionHolds, Senses, grip_of
 from ig2mj.scene.scene import Scene
 
 AHEAD = 0.35
@@ -63,9 +63,6 @@ RUSH_AHEAD, RUSH_TURN = 0.8, 0.15
 """rad off its way up to which a base that drives so goes on, and its greatest command of turning meanwhile: where it
 slows down to turn, an edge stops it."""
 
-PRESSED, PRESSING = 0.2, 2
-"""N with which a finger's link presses on what it holds, at least, and links that hold something by friction alone."""
-
 _BODY = tuple(f"body_{n}" for n in ("x", "y", "z", "roll", "pitch", "yaw"))
 
 QUICK = 0.08
@@ -77,59 +74,6 @@ turns."""
 
 UPRIGHT = 0.5
 """Share of a hovering body's tilt and of its error of height that is taken back in an agent step."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Senses:
-    """What executing a program reads of the view; world frame, m, w-x-y-z. joints: of all robots, rad or m."""
-
-    base_pos: Float[np.ndarray, "W 3"]
-    base_quat: Float[np.ndarray, "W 4"]
-    hand_pos: Float[np.ndarray, "W H 3"]
-    hand_quat: Float[np.ndarray, "W H 4"]
-    held: Bool[np.ndarray, "W H O"]
-    touching: Bool[np.ndarray, "W O"]
-    joints: Float[np.ndarray, "W J"] | None = None
-
-    @property
-    def yaw(self) -> Float[np.ndarray, "W"]:
-        """Direction of the base, rad."""
-        w, x, y, z = np.moveaxis(self.base_quat, -1, 0)
-        return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-
-
-class FrictionHolds:
-    """What hands hold by friction alone, where no constraint says so: what two links of a hand's fingers press on."""
-
-    def __init__(
-        self,
-        hand_of_link: Int[np.ndarray, "F"],
-        object_of_body: Int[np.ndarray, "Y"],
-        objects: int,
-        hands: Int[np.ndarray, "H"],
-    ):
-        """hand_of_link, object_of_body: numbers of each finger link's hand, and each graspable body's object."""
-        self._links = (hand_of_link[None] == hands[:, None]).astype(np.int32)
-        self._bodies = (object_of_body[:, None] == np.arange(objects)).astype(np.int32)
-
-    def __call__(self, force: Float[Array, "W F Y"]) -> Bool[np.ndarray, "W H O"]:
-        """force: N with which each link presses on each body (`AgentView.finger_force`)."""
-        pressed = (np.asarray(force) > PRESSED).astype(np.int32)
-        return (np.einsum("hf,wfy->why", self._links, pressed) >= PRESSING).astype(np.int32) @ self._bodies > 0
-
-
-def sense(view: PhysicsView, agent: int, hands: Int[np.ndarray, "H"], friction: FrictionHolds | None = None) -> Senses:
-    """What the view says of one robot. friction: its hands hold by friction alone; None: by constraints."""
-    a = view.agent
-    return Senses(
-        base_pos=np.asarray(a.base_pos)[:, agent],
-        base_quat=np.asarray(a.base_quat)[:, agent],
-        hand_pos=np.asarray(a.hand_pos)[:, hands],
-        hand_quat=np.asarray(a.hand_quat)[:, hands],
-        held=np.asarray(view.held)[:, hands] if friction is None else friction(a.finger_force),
-        touching=np.asarray(a.touching)[:, agent],
-        joints=np.asarray(a.joint_pos),
-    )
 
 
 Direction = Sequence[float] | np.ndarray
@@ -452,12 +396,6 @@ def goals_of_hand(senses: Senses, rows: Rows) -> tuple[Float[np.ndarray, "W 3"],
     pos = senses.base_pos + np.asarray(quat_rotate(senses.base_quat, rows["pos"]))
     quat = np.asarray(quat_multiply(senses.base_quat, rows["quat"]))
     return np.where(inside[:, None], pos, rows["pos"]), np.where(inside[:, None], quat, rows["quat"])
-
-
-def grip_of(senses: Senses, number: int, grip: Array) -> Float[np.ndarray, "W 3"]:
-    """Where a hand's grasp point is, world frame, m."""
-    point = np.broadcast_to(np.asarray(grip, np.float32), senses.hand_pos[:, number].shape)
-    return senses.hand_pos[:, number] + np.asarray(quat_rotate(senses.hand_quat[:, number], point))
 
 
 def _wrapped(angle: Float[np.ndarray, "W"]) -> Float[np.ndarray, "W"]:

@@ -139,7 +139,7 @@ class Obstacles:
         other._body = (*(float(v) for v in axis), radius, height)
         return other
 
-    def beside(self, carried: Float[np.ndarray, "n 4"]) -> Obstacles:
+    def with_carried(self, carried: Float[np.ndarray, "n 4"]) -> Obstacles:
         """The same with spheres (x, y, z, radius; m) of what a robot's other hands hold."""
         other = copy.copy(self)
         other._carried = carried

@@ -13,8 +13,9 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.host_rotations import rotation_angle
-from ig2mj.planning.bodies import Body, HandedBody, Rows, Senses, goals_of_hand, grip_of, sense
+from ig2mj.planning.bodies import Body, HandedBody, Rows, goals_of_hand
 from ig2mj.planning.phases import REASON_NUMBERS, Base, Phase, Programs, Until
+from ig2mj.planning.senses import Senses, grip_of, sense
 
 RUNNING, DONE = -1, 0
 """Statuses; larger ones are numbers of `REASON_NUMBERS`."""

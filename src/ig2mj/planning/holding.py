@@ -28,20 +28,20 @@ from ig2mj.planning.world import AWAY, PlannedWorld, Rotation, Stance, Vector
 
 
 def wait_until(
-    world: PlannedWorld, wanted: tuple[str, ...], seconds: float, keeps: int = -1
+    world: PlannedWorld, condition: tuple[str, ...], seconds: float, keeps: int = -1
 ) -> Generator[Program, str, str]:
     """Stands still until a predicate holds; returns the reason why it does not.
 
     Args:
-      wanted: its name and its arguments. seconds: after which it is given up. keeps: number of an object that must stay
-        in the hand, -1: none.
+      condition: its name and its arguments. seconds: after which it is given up. keeps: number of an object that must
+        stay in the hand, -1: none.
     """
     for _ in range(int(np.ceil(seconds / WAIT))):
-        if world.facts.holds(*wanted):
+        if world.facts.holds(*condition):
             return ""
         if reason := (yield [Phase(until=Until.WAITED, keeps=keeps, limit=int(10 * WAIT))]):
             return reason
-    return "" if world.facts.holds(*wanted) else "not_true_after"
+    return "" if world.facts.holds(*condition) else "not_true_after"
 
 
 WAIT = 1.0

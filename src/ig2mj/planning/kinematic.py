@@ -20,7 +20,7 @@ from jaxtyping import Float
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse, yaw_quat
 from ig2mj.planning.arms import ArmBody
-from ig2mj.planning.bodies import HoveringBody, Senses
+from ig2mj.planning.bodies import HoveringBody
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
@@ -30,6 +30,7 @@ from ig2mj.planning.moves import Program
 from ig2mj.planning.phases import Base, Phase, Until
 from ig2mj.planning.primitives import primitive
 from ig2mj.planning.problem import Problem, start_of
+from ig2mj.planning.senses import Senses
 from ig2mj.planning.starts import open_doors, scene_with_robot
 from ig2mj.planning.steps import Outcome, PlanningError, Step
 from ig2mj.planning.symbolic import SymbolicRung

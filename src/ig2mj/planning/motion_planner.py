@@ -23,7 +23,7 @@ from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, quat_ro
 from ig2mj.install_hint import pip_install_extra
 from ig2mj.planning.arm_links import JOINT_SAMPLES, ArmWay, LinkSpheres
 from ig2mj.planning.arms import ArmBody
-from ig2mj.planning.bodies import Body, HoveringBody, grip_of, sense
+from ig2mj.planning.bodies import Body, HoveringBody
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles, PlacedPieces
 from ig2mj.planning.footprint import BaseFootprint
@@ -32,6 +32,7 @@ from ig2mj.planning.hand_collision import HandCollision
 from ig2mj.planning.hand_way import HandWay
 from ig2mj.planning.occupancy import Occupancy, door_objects
 from ig2mj.planning.rrt_connect import is_installed
+from ig2mj.planning.senses import grip_of, sense
 from ig2mj.planning.steps import PlanningError
 from ig2mj.scene.scene import Scene
 

@@ -19,13 +19,14 @@ from ig2mj.agents.humanoid.robot import Humanoid
 from ig2mj.agents.registry import find_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.planning import execution
-from ig2mj.planning.bodies import Body, FrictionHolds, HandedBody
+from ig2mj.planning.bodies import Body, HandedBody
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.moves import Primitive, Program
 from ig2mj.planning.primitives import primitive
+from ig2mj.planning.senses import FrictionHolds
 from ig2mj.planning.stage import Stage
 from ig2mj.planning.steps import Outcome, PlanningError, Step, UnsupportedPrimitive
 from ig2mj.planning.world import PlannedWorld

@@ -38,7 +38,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.opening import Tried, open_into
 from ig2mj.planning.phases import Phase, Until
-from ig2mj.planning.spots import Spot, grip_for, is_tipped, spots_for, spots_upon
+from ig2mj.planning.spots import Spot, grip_for, is_tipped, put_there, spots_for, spots_upon
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.two_hands import place_with_both
@@ -123,14 +123,13 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 *rest(hand),
                 Phase(until=Until.WAITED, limit=6 if spot.drop == 0.0 else FALLING),
             ]  # fmt: skip
-            facts = world.facts
-            if not facts.holds(until or predicate, name, where):
-                reason, detail = reason or "not_true_after", f"{name} is not where it was put"
+            placed, detail = put_there(world.facts, step, until or predicate)
+            if not placed:
+                reason = reason or "not_true_after"
                 continue
-            lacking = [c for c in step.also if facts.holds(c.predicate, *c.arguments) != c.value]
-            if not lacking:
+            if not detail:
                 return Outcome(attempts=attempt + 1)
-            reason, detail = "not_true_after", f"{name} was put there, and {lacking[0]} is false"
+            reason = "not_true_after"
             if not also or attempt > 0:
                 break
         return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)

@@ -21,7 +21,7 @@ from ig2mj.planning.steps import PlanningError
 from ig2mj.predicates import logic
 from ig2mj.predicates.compile import CompiledExpression, compile_expression
 from ig2mj.predicates.host_queries import HostQueries
-from ig2mj.predicates.literals import AbilityWarning
+from ig2mj.predicates.literals import AbilityWarning, names_of_objects
 from ig2mj.predicates.logic import Expression
 from ig2mj.predicates.parse import parse
 from ig2mj.scene.paths import SHIPPED_HOMES
@@ -72,7 +72,7 @@ class Problem:
     @property
     def named(self) -> tuple[str, ...]:
         """Names of objects and rooms that its definition names."""
-        goal = [a for atom in self.goal.atoms for a in atom.arguments]
+        goal = names_of_objects(self.goal.atoms, rooms=True)
         own = self.task.binding.objects.values() if isinstance(self.task, BddlTask) else ()
         return tuple(dict.fromkeys([*goal, *own]))
 
@@ -89,7 +89,13 @@ class Problem:
         return pool_of(self.task, split, count)
 
 
-def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = (), home: str | None = None) -> Problem:
+def problem_of(
+    what: str,
+    goal: str | None = None,
+    objects: Sequence[str] = (),
+    home: str | None = None,
+    in_use: Sequence[str] = (),
+) -> Problem:
     """The problem of an activity's name, or of a scene and a goal.
 
     Args:
@@ -97,6 +103,7 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = (), 
       goal: expression; None: that of the activity. Substances that it wants in containers are in use.
       objects: what is added to a home, and changed in it (`load_scene`).
       home: of an activity of BEHAVIOR, in place of its own; None: its own.
+      in_use: substances that are in use in a scene whatever its goal wants; an activity has its own.
 
     Raises:
       UnknownNameError: no such activity, scene, object or predicate. PlanningError: a scene without a goal, or objects
@@ -128,7 +135,7 @@ def problem_of(what: str, goal: str | None = None, objects: Sequence[str] = (), 
         except Exception:
             raise UnknownNameError("activity", what, [*activity_names(), *TASKS]) from None
         raise PlanningError(f'{what} is a scene: give a goal, such as "(inside apple_0 fridge_0)"')
-    objects = [*objects, *substances_as_text(_filling(goal))]
+    objects = [*objects, *substances_as_text(list(dict.fromkeys([*in_use, *_filling(goal)])))]
     scene = load_scene(what, objects=objects)
     model = StateModel.of_manifest(scene.tables, scene.manifest)
     own = scene.name if scene.folder.parent == SHIPPED_HOMES else scene.folder.resolve()

@@ -12,13 +12,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ig2mj.knowledge.substances import WATER
 from ig2mj.knowledge.taxonomy import is_a
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.steps import PRIMITIVES, Step
 from ig2mj.sampling.conditions import Condition
+from ig2mj.scene.substance_requests import substances_as_text
 
 KIT = ("rag/rag_00", "carving_knife/carving_knife_00", "apple/apple_00", "steak/steak_00")
 """Of the object library, added to every home: most lack something that cleans, cuts, is cut or is cooked."""
+
+ADDED = (*KIT, *substances_as_text([WATER]))
+"""What a home is loaded with: the objects of `KIT`, and water that containers can hold."""
 
 MEASURED = tuple(PRIMITIVES)
 """Primitives that requests are drawn for."""

@@ -16,6 +16,7 @@ from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.free_floor import NEAR_START
 from ig2mj.planning.occupancy import RESOLUTION
+from ig2mj.planning.steps import Step
 from ig2mj.planning.world import PlannedWorld, Rotation, Vector
 from ig2mj.sampling.areas import WITHOUT_CONTACT, areas_for
 from ig2mj.sampling.conditions import Condition
@@ -141,6 +142,16 @@ def spots_upon(world: PlannedWorld, name: str, where: str) -> Iterator[Spot]:
             height = obstacles.below(xy, top + CLOSE, [index])
             if np.isfinite(height):
                 yield Spot(np.array([*(xy - (low + high)[:2] / 2), height - low[2]]), new)
+
+
+def put_there(facts: Facts, step: Step, relation: str) -> tuple[bool, str]:
+    """Whether the object of a placement is where it was put, by the relation that ends it, and what of the step is
+    false, in words; "": nothing."""
+    name, where = step.arguments
+    if not facts.holds(relation, name, where):
+        return False, f"{name} is not where it was put"
+    lacking = [c for c in step.also if facts.holds(c.predicate, *c.arguments) != c.value]
+    return True, f"{name} was put there, and {lacking[0]} is false" if lacking else ""
 
 
 def grip_for(world: PlannedWorld, hand: int, name: str, spot: Spot) -> tuple[Vector, Float[np.ndarray, "4"], Rotation]:

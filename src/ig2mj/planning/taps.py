@@ -1,13 +1,15 @@
-"""Water sources as a robot uses them: where the water comes out, and room below it."""
+"""Water sources as a robot uses them: where the water comes out, room below it, and what is held there."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
-from ig2mj.planning.moves import Program
-from ig2mj.planning.placing import bring_out
+from ig2mj.planning.holding import Hold, hold_at, wait_until
+from ig2mj.planning.moves import Primitive, Program, carry, hand_with, travel
+from ig2mj.planning.placing import bring_out, regrasp
+from ig2mj.planning.steps import Outcome
 from ig2mj.planning.world import PlannedWorld, Vector
 from ig2mj.scene.tables import LinkKind
 
@@ -17,6 +19,46 @@ def source_of(world: PlannedWorld, tap: str) -> Vector:
     tables = world.domain.model.tables
     links = np.flatnonzero((tables.link_object == world.index(tap)) & (tables.link_kind == LinkKind.WATER_SOURCE))
     return np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
+
+
+def hold_below_tap(
+    world: PlannedWorld,
+    name: str,
+    tap: str,
+    holds: Callable[[int, Vector], Sequence[Hold]],
+    condition: tuple[str, ...],
+    seconds: float,
+) -> Primitive:
+    """Holds an object below a tap that runs, in one way after another, until a predicate holds.
+
+    Args:
+      holds: ways of holding it, from the number of the hand and where the water comes out (m, world frame).
+      condition: the predicate and its arguments. seconds: for which each way is held, at most.
+    """
+    hand, source = hand_with(world, name), source_of(world, tap)
+    reason, failed, again, moved = "", set[int](), False, set[str]()
+    for _ in range(WAYS + MOST_MOVED):
+        left = lambda hand=hand: [h for h in holds(hand, source) if h.number not in failed]  # noqa: E731
+        reason, way, number = yield from hold_at(world, name, hand, left)
+        if number < 0 and (yield from clear_basin(world, source, moved)) and name in world.held:
+            continue
+        if number < 0 and not again and (yield from regrasp(world, name, hand)):  # by another side
+            again, hand = True, hand_with(world, name)
+            continue
+        if number < 0:
+            return Outcome(reason, f"the hand has no way with {name} below {tap}")
+        reason = reason or (yield from wait_until(world, condition, seconds, world.index(name)))
+        yield [*travel(hand, way[-2::-1], None), carry(world, hand)]
+        if world.facts.holds(*condition):
+            return Outcome()
+        failed.add(number)
+        if name not in world.held:
+            return Outcome("slipped", f"the hand lost {name}")
+    return Outcome(reason or "not_true_after", f"{name} did not take enough water")
+
+
+WAYS = 3
+"""Ways of holding an object below a tap that are tried."""
 
 
 def clear_basin(world: PlannedWorld, source: Vector, moved: set[str]) -> Generator[Program, str, bool]:

@@ -22,9 +22,8 @@ from ig2mj.planning.moves import (
     vector3,
 )
 from ig2mj.planning.phases import Phase
-from ig2mj.planning.placing import regrasp
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.taps import MOST_MOVED, clear_basin, source_of
+from ig2mj.planning.taps import hold_below_tap
 from ig2mj.planning.world import PlannedWorld, Rotation, Vector
 from ig2mj.scene.tables import LinkKind
 
@@ -102,32 +101,12 @@ PITCHES, COLUMN = (0.0, 0.5, 0.9, 1.3), 0.03
 def soak(world: PlannedWorld, step: Step) -> Primitive:
     """Holds the object below the tap."""
     name, tap = step.arguments
-    hand = hand_with(world, name)
-    source = source_of(world, tap)
-    reason, number, failed, again, moved = "", -1, set[int](), False, set[str]()
-    for _ in range(SOAKS + MOST_MOVED):
-        left = lambda hand=hand: [h for h in _holds_below(world, name, hand, source) if h.number not in failed]  # noqa: E731
-        reason, way, number = yield from hold_at(world, name, hand, left)
-        if number < 0 and (yield from clear_basin(world, source, moved)) and name in world.held:
-            continue
-        if number < 0 and not again and (yield from regrasp(world, name, hand)):  # by another side
-            again, hand = True, hand_with(world, name)
-            continue
-        if number < 0:
-            return Outcome(reason, f"the hand has no way with {name} below {tap}")
-        reason = reason or (yield from wait_until(world, ("soaked", name), SOAKING, world.index(name)))
-        yield [*travel(hand, way[-2::-1], None), carry(world, hand)]
-        if world.facts.holds("soaked", name):
-            return Outcome()
-        failed.add(number)
-        if name not in world.held:
-            return Outcome("slipped", f"the hand lost {name}")
-    return Outcome(reason or "not_true_after", f"{name} did not take enough water")
+    ways = functools.partial(_holds_below, world, name)
+    return (yield from hold_below_tap(world, name, tap, ways, ("soaked", name), SOAKING))
 
 
-BELOW_TAP, SOAKS = (0.065, 0.1, 0.15), 3
-"""m below a source of water at which the top of what is soaked is held: drops begin 5 cm below it; and ways of holding
-it that are tried."""
+BELOW_TAP = (0.065, 0.1, 0.15)
+"""m below a source of water at which the top of what is soaked is held: drops begin 5 cm below it."""
 
 
 def cook(world: PlannedWorld, step: Step) -> Primitive:

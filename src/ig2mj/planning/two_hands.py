@@ -37,7 +37,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase, Until
-from ig2mj.planning.spots import Spot, grip_for, spots_for
+from ig2mj.planning.spots import Spot, grip_for, put_there, spots_for
 from ig2mj.planning.stances import reaching_with
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.taking import closing_on, entries, way_to
@@ -354,14 +354,13 @@ def place_with_both(world: PlannedWorld, predicate: str, step: Step, until: str 
         ]
         if name in world.held:  # one of the hands lost it on the way down
             yield _let_go(world, [world.grip(hand) for hand in (0, 1)], [world.hand_axes(hand)[1] for hand in (0, 1)])
-        facts = world.facts
-        if not facts.holds(until or predicate, name, where):
-            reason, detail = reason or "not_true_after", f"{name} is not where it was put"
+        placed, detail = put_there(world.facts, step, until or predicate)
+        if not placed:
+            reason = reason or "not_true_after"
             continue
-        lacking = [c for c in step.also if facts.holds(c.predicate, *c.arguments) != c.value]
-        if not lacking:
+        if not detail:
             return Outcome(attempts=attempt + 1)
-        reason, detail = "not_true_after", f"{name} was put there, and {lacking[0]} is false"
+        reason = "not_true_after"
         break
     return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 

@@ -13,13 +13,14 @@ from jaxtyping import Float
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.host_rotations import about_vertical, matrix_to_quat
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.bodies import ALONG, Follower, HandedBody, Senses, grip_of, sense
+from ig2mj.planning.bodies import ALONG, Follower, HandedBody
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.footprint import BaseFootprint, Disc
 from ig2mj.planning.free_floor import FreeFloor
 from ig2mj.planning.motion_planner import MotionPlanner
+from ig2mj.planning.senses import Senses, grip_of, sense
 from ig2mj.planning.stage import Stage
 from ig2mj.predicates.literals import object_index
 from ig2mj.sampling.query import SceneQuery
@@ -172,7 +173,7 @@ class PlannedWorld:
         if not points:
             return found
         carried = np.concatenate(points)
-        return found.beside(np.column_stack([carried, np.full(len(carried), CARRIED)]))
+        return found.with_carried(np.column_stack([carried, np.full(len(carried), CARRIED)]))
 
     @property
     def stance(self) -> Stance:

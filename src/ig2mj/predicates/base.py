@@ -77,7 +77,8 @@ class Predicate:
 
     Attributes:
       name: snake_case. arguments: what each argument is; an agent's index is the number of objects plus its own.
-        evaluate: truth for argument tuples. ability: without it the first argument's answer is False.
+        evaluate: truth for argument tuples. ability: without it the first argument's answer is False. never: why the
+        answer is False for this object as the first argument, whatever its ability; "": it need not be.
         aliases: other names (iGibson's, BDDL's tokens, the paper's). queries: relations it needs. why: text with
         the numbers behind the answer in one world. per_object: see `of_states`. of_arguments: of what a view says of
         objects it reads only its arguments (their links, bodies and joints), and floors (`goal_rows`).
@@ -89,6 +90,7 @@ class Predicate:
     arguments: tuple[Role, ...]
     evaluate: Evaluate
     ability: str | None = None
+    never: Callable[[StateModel, int], str] | None = None
     aliases: tuple[str, ...] = ()
     queries: Queries = no_queries
     why: Why | None = None
@@ -108,6 +110,12 @@ class Predicate:
     @property
     def arity(self) -> int:
         return len(self.arguments)
+
+    def lacks(self, model: StateModel, first: int) -> str:
+        """Why it is False for this first argument in every state; "": it need not be."""
+        if self.ability is not None and self.ability not in model.parameters.abilities[first]:
+            return f"its category '{model.tables.object_categories[first]}' is not {self.ability}"
+        return "" if self.never is None else self.never(model, first)
 
 
 def celsius(value: float) -> str:

@@ -159,17 +159,15 @@ def resolve(model: StateModel, atom: Atom, strict: bool = False) -> Literal:
         raise Ig2mjError(
             f"predicate '{predicate.name}' of two agents: contacts of agents with each other are not known"
         )
-    able = predicate.ability is None or predicate.ability in model.parameters.abilities[arguments[0]]
-    if not able:
-        name = atom.arguments[0]
-        category = model.tables.object_categories[arguments[0]]
-        message = f"predicate '{predicate.name}' of '{name}': its category '{category}' is not {predicate.ability}"
+    name, lacks = atom.arguments[0], predicate.lacks(model, arguments[0])
+    if lacks:
+        message = f"predicate '{predicate.name}' of '{name}': {lacks}"
         if strict:
             raise AbilityError(message)
         if (predicate.name, name) not in _WARNED:
             _WARNED.add((predicate.name, name))
             warn_user(f"{message}; it is False", AbilityWarning)
-    return Literal(atom, predicate, arguments, able)
+    return Literal(atom, predicate, arguments, not lacks)
 
 
 def object_index(model: StateModel, name: str) -> int:
@@ -212,8 +210,11 @@ NO_OBJECT = ("room", "substance")
 """Roles of arguments that no object, and so no half, can have."""
 
 
-def names_of_objects(atoms: Iterable[Atom]) -> list[str]:
+def names_of_objects(atoms: Iterable[Atom], rooms: bool = False) -> list[str]:
     """Names that stand where predicates take objects, in their order, each once; without variables of quantifiers.
+
+    Args:
+      rooms: also those that stand where predicates take rooms.
 
     Raises:
       UnknownNameError: there is no such predicate.
@@ -222,7 +223,7 @@ def names_of_objects(atoms: Iterable[Atom]) -> list[str]:
         name
         for atom in atoms
         for name, role in zip(atom.arguments, find(atom.predicate).arguments, strict=False)
-        if role not in NO_OBJECT and not name.startswith("?")
+        if (role not in NO_OBJECT or (rooms and role == "room")) and not name.startswith("?")
     ]
     return list(dict.fromkeys(found))
 

@@ -65,6 +65,14 @@ def of_pairs(name: str, of: OfPairs, **fields) -> Predicate:
     return Predicate(name=name, arguments=("object", "substance"), evaluate=evaluate, of_arguments=True, **fields)
 
 
+def no_container(model: StateModel, obj: int) -> str:
+    """Why an object never contains substances; "": it may, or no substances are in use."""
+    found = model.substances
+    if found is None or found.containers.row_of(obj) is not None:
+        return ""
+    return "it is no container of substances"
+
+
 def of_containers(model: StateModel, table: Bool[Array, "W C U"] | None, num_worlds: int) -> Bool[Array, "W O A"]:
     """A table of containers and the substances in use, for all objects and substances."""
     if table is None or model.substances is None:

@@ -28,7 +28,7 @@ from ig2mj.planning.kinematic import SETTLE, KinematicRung
 from ig2mj.planning.kinematic_stage import KinematicStage
 from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.physics import PhysicsRung
-from ig2mj.planning.requests import KIT, MEASURED, Request, RequestSource
+from ig2mj.planning.requests import ADDED, MEASURED, Request, RequestSource
 from ig2mj.planning.rung import Rung
 from ig2mj.planning.starts import open_doors, start_place
 from ig2mj.planning.steps import Outcome, PlanningError, Step
@@ -102,7 +102,7 @@ def _bench(home: str, rung: str, robot: str, seed: int) -> RequestBench:
 
 
 class RequestBench:
-    """A home with the objects of `KIT` and a robot, in which requests are carried out one after another.
+    """A home with what `ADDED` names and a robot, in which requests are carried out one after another.
 
     Attributes:
       home: its name.
@@ -116,7 +116,7 @@ class RequestBench:
         if rung not in RUNGS:
             raise PlanningError(f"requests cannot be measured on the {rung} rung ({', '.join(RUNGS)} can)")
         self.home, self._seed = home, seed
-        bare = load_scene(home, objects=KIT)
+        bare = load_scene(home, objects=ADDED)
         self._sampler = make_sampler(bare)
         self._own_start = self._sampler.start
         body: Any = make_robot(robot)
@@ -129,7 +129,7 @@ class RequestBench:
         if rung == "symbolic":
             return
         x, y = start_place(bare, self._sampler.query.view, ())
-        scene = load_scene(home, agents=[body.at(x, y, 0.0)], objects=KIT)
+        scene = load_scene(home, agents=[body.at(x, y, 0.0)], objects=ADDED)
         self._query = SceneQuery(scene)
         if rung == "physics":
             self._simulation = Simulation(scene, seed=seed, grasping="assisted")

@@ -25,6 +25,7 @@ def expression_of(what: str, goal: str | None, objects: Sequence[str], robot: st
     Raises:
       NotUnderstoodError: words have no meaning. PlanningError: what they ask for has no lasting effect.
     """
+    from ig2mj.knowledge.substances import WATER
     from ig2mj.planning.problem import problem_of
     from ig2mj.planning.steps import PlanningError
     from ig2mj.planning.symbolic import start_facts
@@ -32,7 +33,7 @@ def expression_of(what: str, goal: str | None, objects: Sequence[str], robot: st
 
     if goal is None or goal.lstrip().startswith("("):
         return goal
-    problem = problem_of(what, EMPTY, objects)
+    problem = problem_of(what, EMPTY, objects, in_use=[WATER])  # words may ask for water before a goal names it
     instruction = understand(goal, start_facts(domain_of(problem, robot), problem.scene, problem.pool(), 0))
     for note in instruction.notes:
         print(note, file=sys.stderr)

@@ -6,7 +6,7 @@ from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
 from ig2mj.predicates.definitions.filled import why_volume
-from ig2mj.predicates.substances import of_containers, of_pairs
+from ig2mj.predicates.substances import no_container, of_containers, of_pairs
 from ig2mj.states.model import StateModel
 from ig2mj.states.substances import volume
 from ig2mj.states.world import ExtendedStates
@@ -19,4 +19,4 @@ def _contains(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O A"]
 
 CONTAINS_TABLE = _contains
 
-CONTAINS = of_pairs("contains", _contains, why=why_volume)
+CONTAINS = of_pairs("contains", _contains, why=why_volume, never=no_container)

@@ -7,7 +7,7 @@ from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
 from ig2mj.predicates.base import Context
-from ig2mj.predicates.substances import of_containers, of_pairs, substance_names
+from ig2mj.predicates.substances import no_container, of_containers, of_pairs, substance_names
 from ig2mj.states.model import StateModel
 from ig2mj.states.substances import volume
 from ig2mj.states.world import ExtendedStates
@@ -31,4 +31,4 @@ def why_volume(context: Context, arguments: tuple[int, ...], world: int) -> str:
     return f"{litres:.4g} l of {name}, it holds {float(found.containers.litres[row]):.4g} l"
 
 
-FILLED = of_pairs("filled", _filled, why=why_volume)
+FILLED = of_pairs("filled", _filled, why=why_volume, never=no_container)
