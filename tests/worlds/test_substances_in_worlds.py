@@ -9,7 +9,7 @@ from substance_world import GLASS
 
 import ig2mj
 from benchmarks.harness.pouring import write_pouring
-from ig2mj.errors import StateError, UnknownNameError
+from ig2mj.errors import AbilityError, StateError, UnknownNameError
 from ig2mj.sampling.many import sample
 from ig2mj.simulation import Simulation
 from ig2mj.states import initial_states
@@ -61,7 +61,7 @@ def test_what_is_set_holds(scene):
     assert simulation.set_predicate("empty", "glass") and simulation.predicate("empty", "glass")
     with pytest.raises(UnknownNameError, match="substances="):
         simulation.predicate("filled", "glass", "salt")
-    with pytest.raises(StateError, match="no container"):
+    with pytest.raises(AbilityError, match="no container"):
         simulation.set_predicate("filled", "floor", "water")
 
 

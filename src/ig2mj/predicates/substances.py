@@ -70,7 +70,7 @@ def no_container(model: StateModel, obj: int) -> str:
     found = model.substances
     if found is None or found.containers.row_of(obj) is not None:
         return ""
-    return "it is no container of substances"
+    return "it is no container of substances: its model has no inside"
 
 
 def of_containers(model: StateModel, table: Bool[Array, "W C U"] | None, num_worlds: int) -> Bool[Array, "W O A"]:
