@@ -7,14 +7,17 @@ import shutil
 
 import engine_bench
 import msgspec
+import mujoco
 import pytest
 
 import ig2mj
 from ig2mj import cli
+from ig2mj.agents import Humanoid
 from ig2mj.agents.floating_hand import FloatingHand
 from ig2mj.calibration.measuring import SAFETY, _wider, calibrate
 from ig2mj.calibration.reach import find_reach
 from ig2mj.engine.health import Overflow
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.warp.buffer_sizes import ALIGN
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.engine.warp.profile import (
@@ -22,12 +25,15 @@ from ig2mj.engine.warp.profile import (
     EngineProfile,
     default_profile,
     fit,
+    holding,
     holds_everything,
     load_profile,
+    profile_of_scene,
     save_profile,
 )
 from ig2mj.errors import EngineError, InputError
 from ig2mj.scene import manifest as mf
+from ig2mj.scene.paths import shipped_homes
 
 PROFILE = EngineProfile(awake_dofs=12, constraints=64, contacts=16, convex_contacts=8, measured={"peak_contacts": 12.5})
 
@@ -102,6 +108,43 @@ def test_a_profile_holds_one_worlds_worst_in_any_batch():
     assert (many.contacts, many.convex_contacts) == (17, 9)
     assert alone.spare_contacts == many.spare_contacts == 0
     assert alone.for_worlds(1) == alone
+
+
+@pytest.mark.parametrize("worlds", [1, 2, 40])
+def test_an_engine_takes_over_its_scenes_start_whatever_its_sizes_say(tiny_home, worlds):
+    """MJX refuses lists that do not hold the contacts and rows of the state that it is given."""
+    start = _start(tiny_home.model)
+    assert start.ncon > 1 and start.nefc > 1
+    tiny = EngineProfile(awake_dofs=tiny_home.model.nv, constraints=1, contacts=1, convex_contacts=900)
+    engine = WarpEngine(tiny_home, worlds, profile=tiny, initial=NativeEngine(tiny_home).first_world()[0])
+    sizes = engine.profile
+    assert sizes.contacts * worlds >= start.ncon > (sizes.contacts - 1) * worlds or sizes.contacts == 1
+    assert sizes.constraints == start.nefc and sizes.convex_contacts == sizes.contacts
+    assert engine._template._impl.contact__dist.shape == (worlds * sizes.contacts,)
+
+
+@pytest.mark.parametrize("agents", [[], [Humanoid()]], ids=["bare", "humanoid"])
+def test_sizes_of_every_home_hold_its_start_in_any_batch(agents):
+    """Cedar has 428 contacts before it has come to rest, and its profile room for 324 in two worlds together."""
+    homes = shipped_homes()
+    assert {"cedar", "small_home", "willow"} <= set(homes)
+    for name in homes:
+        scene = ig2mj.load_scene(name, agents=agents)
+        start, measured = _start(scene.model), profile_of_scene(scene)
+        for worlds in (1, 2, 3, 8, 64, 1000):
+            own = measured.for_worlds(worlds)
+            sizes = holding(own, start, worlds)
+            assert worlds * sizes.contacts >= start.ncon and sizes.constraints >= start.nefc, name
+            assert sizes.convex_contacts <= sizes.contacts and sizes.awake_dofs == own.awake_dofs, name
+        assert holding(own, start, 1000) == own, f"{name}: large batches take no more memory"
+
+
+def _start(model: mujoco.MjModel) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    return data
 
 
 def test_a_disturbed_home_is_measured_natively(tiny_home):

@@ -33,7 +33,7 @@ from ig2mj.engine.warp import kernels, patches
 from ig2mj.engine.warp.ignored_contacts import DROP, encode, filter_contacts
 from ig2mj.engine.warp.patches import scratch, table
 from ig2mj.engine.warp.patches.flags import REPLACED
-from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
+from ig2mj.engine.warp.profile import EngineProfile, fit, holding, holds_everything, profile_of_scene
 from ig2mj.engine.warp.unwritten import unwritten_is_zero
 from ig2mj.process import entry_point, prepare_warp
 from ig2mj.process.gc_pause import Traced
@@ -209,7 +209,8 @@ class WarpEngine(MjxEngine):
         return put if self._print_overflow else put.tree_replace({"opt._impl.warn_overflow": 0})
 
     def _put_data(self, model: mujoco.MjModel, data: mujoco.MjData) -> mjx.Data:
-        worlds, profile = self._worlds_of_buffers, self.profile
+        worlds = self._worlds_of_buffers
+        self.profile = profile = holding(self.profile, data, worlds)
         with unwritten_is_zero(), patches.counted_quickly(self.own_kernels):
             return mjx.put_data(
                 model,

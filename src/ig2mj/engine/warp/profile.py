@@ -68,6 +68,21 @@ class EngineProfile(msgspec.Struct, omit_defaults=True):
         )
 
 
+def holding(profile: EngineProfile, data: mujoco.MjData, num_worlds: int) -> EngineProfile:
+    """Sizes no smaller than MJX needs to take over a state of one world, which it makes those of all worlds from.
+
+    A home before it has come to rest is awake and has contacts within the margins of most of its objects, more than
+    a few worlds together need later.
+
+    Args:
+      profile: for batches of `num_worlds` (`EngineProfile.for_worlds`). data: the state, after `mj_forward`.
+    """
+    contacts = max(profile.contacts, math.ceil(data.ncon / num_worlds))
+    constraints = max(profile.constraints, int(data.nefc))
+    convex = min(profile.convex_contacts, contacts)  # MJX refuses more of them than contacts
+    return msgspec.structs.replace(profile, contacts=contacts, constraints=constraints, convex_contacts=convex)
+
+
 def default_profile(model: mujoco.MjModel) -> EngineProfile:
     """Sizes that hold anything a household scene does: everything awake, every geom in contact with several others."""
     geoms = int(((model.geom_contype != 0) | (model.geom_conaffinity != 0)).sum())
