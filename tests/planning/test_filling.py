@@ -60,7 +60,7 @@ def test_an_exported_plan_has_the_action_and_water_as_a_constant(tmp_path):
 @pytest.mark.parametrize(
     ("goal", "said"),
     [
-        ("(filled bowl_0 milk)", "with water only"),
+        ("(filled bowl_0 milk)", "no container that can be carried holds enough milk"),
         ("(filled sofa_0 water)", "'sofa_0' is no container"),
     ],
 )

@@ -199,10 +199,7 @@ class PrimitiveEnv(gymnasium.Env):
             if not 0 <= int(action) < len(self.actions):
                 raise EngineError(f"action {action}: there are {len(self.actions)}")
             step = self.actions[int(action)]
-        rooms = self.problem.model.tables.room_names
-        for name in step.arguments:
-            if name not in rooms:
-                self.domain.index(name)
+        self.domain.check(step)
         return step
 
     def _info(self, facts: Facts) -> dict[str, Any]:

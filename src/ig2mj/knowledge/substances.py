@@ -36,6 +36,9 @@ DRY = "dry"
 
 SOAPS = ("liquid_soap", "detergent", "shampoo", "saddle_soap")
 
+FILL = 0.6
+"""Share of a container's litres that it holds when it is filled at the start."""
+
 COOKED_DARKER = 0.75
 """Factor of a base's colour."""
 

@@ -52,7 +52,7 @@ def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, 
 
 def _loose(world: PlannedWorld, step: Step) -> list[str]:
     """Things that may be moved out of the way for a step."""
-    return [n for n in world.domain.loose if n not in step.arguments and n not in world.held]
+    return [n for n in world.domain.loose if n not in step.things and n not in world.held]
 
 
 def clutter_in_the_way(world: PlannedWorld, step: Step) -> str | None:
@@ -117,7 +117,7 @@ def target_of(world: PlannedWorld, step: Step) -> Float[np.ndarray, "3"] | None:
     """What a step is about: what it acts on, or where what is held goes; None: where the robot is, or anywhere."""
     names = world.domain.model.tables.object_names
     tables = world.domain.model.tables
-    for name in step.arguments:
+    for name in step.things:
         if name in names and name not in world.held and not tables.object_is_floor[world.index(name)]:
             return world.com(name)
     return None

@@ -10,13 +10,16 @@ from collections.abc import Iterable
 import numpy as np
 
 from ig2mj.agents.task_robot import TaskRobot
-from ig2mj.knowledge.substances import WATER
+from ig2mj.knowledge.substances import DUST, WATER
+from ig2mj.planning.steps import PRIMITIVES, Step
 from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.registry import find
+from ig2mj.predicates.substances import substance_index
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.rules import PLACEMENTS
 from ig2mj.states.model import StateModel
+from ig2mj.states.substances.model import ALWAYS
 
 SUPPORT_HEIGHT, SUPPORT_EDGE = (0.25, 1.3), 0.3
 """m: heights of the upper sides, and least horizontal edge, of furniture on which an object can be put out of the
@@ -67,6 +70,14 @@ class Domain:
     def index(self, name: str) -> int:
         """Position of an object. Raises UnknownNameError."""
         return object_index(self.model, name)
+
+    def check(self, step: Step) -> None:
+        """Raises UnknownNameError: the scene has no such object or room, or does not use the substance."""
+        for name in step.arguments:
+            if name not in step.things:
+                substance_index(self.model, name)
+            elif name not in self.model.tables.room_names:
+                self.index(name)
 
     def has(self, name: str, ability: str) -> bool:
         """Whether an object has an ability."""
@@ -147,7 +158,42 @@ class Domain:
         found = self.model.substances
         if found is None or found.water < 0 or not self.taps:
             return ()
+        return self.pourable
+
+    @functools.cached_property
+    def pourable(self) -> tuple[str, ...]:
+        """Containers that can be carried, and turned over."""
         return tuple(n for n in self.loose if self.contains(n) and self.graspable(n))
+
+    @functools.cached_property
+    def sprays(self) -> tuple[str, ...]:
+        """Containers that spray what they hold, and can be carried."""
+        return ()
+
+    def litres(self, name: str) -> float:
+        """Litres that a container holds; of anything else, 0."""
+        found = self.model.substances
+        row = None if found is None else found.containers.row_of(self.index(name))
+        return 0.0 if found is None or row is None else float(found.containers.litres[row])
+
+    def absorbs(self, name: str) -> bool:
+        """Whether an object absorbs what is poured or sprayed onto it."""
+        return bool(np.isfinite(self.model.parameters.wetness_soaked[self.index(name)]))
+
+    def meant(self, step: Step) -> Step:
+        """A step that says what it is to make true: of a primitive with `one_of`, if it does not yet, what the target
+        can be."""
+        templates = PRIMITIVES[step.primitive].one_of
+        if not templates or step.also:
+            return step
+        target = self.receiver(step)
+        predicate = "contains" if self.contains(target) else "saturated" if self.absorbs(target) else "covered"
+        template = next(t for t in templates if t[0] == predicate)
+        return dataclasses.replace(step, also=(step.condition(template),))
+
+    def receiver(self, step: Step) -> str:
+        """What gets the substance of a step of a primitive with `one_of`."""
+        return step.condition(PRIMITIVES[step.primitive].one_of[0]).arguments[0]
 
     @functools.cached_property
     def sources(self) -> tuple[HeatSource, ...]:
@@ -195,24 +241,37 @@ class Domain:
             return ""
         if predicate.ability is not None and not self.has(name, predicate.ability):
             return f"'{name}' is not {predicate.ability}" if value else ""
-        if condition.predicate in ("filled", "contains"):
-            return self._unfillable(name, condition.arguments[1], value)
+        if condition.predicate in ("filled", "contains", "saturated", "covered"):
+            return self._cannot_receive(condition.predicate, name, condition.arguments[1], value)
         return self._unchangeable(condition.predicate, name, value)
 
-    def _unfillable(self, name: str, substance: str, value: bool) -> str:
-        """Why no primitive fills a container with a substance, or takes it out."""
-        substances = self.model.substances
+    def _cannot_receive(self, predicate: str, name: str, substance: str, value: bool) -> str:
+        """Why no primitive brings a substance into or onto an object, or takes it from there."""
+        found = self.model.substances
+        if substance in ALWAYS:
+            dirty = "dusty" if substance == DUST else "stained"
+            return f"primitives only take {substance} off objects: (not ({dirty} {name}))"
         if not value:
-            return f"no primitive takes {substance} out of '{name}'"
-        if substance != WATER:
-            return f"primitives fill containers with {WATER} only"
-        if substances is None or substances.water < 0:
-            return f"the scene has no {WATER} in use (--substances {WATER})"
-        if not self.contains(name):
-            return f"'{name}' is no container"
-        if not self.taps:
-            return f"the scene has no {WATER} that runs"
-        return "" if name in self.fillable else f"'{name}' cannot be carried to {WATER}"
+            return (
+                f"no primitive takes {substance} {'out of' if predicate in ('filled', 'contains') else 'off'} '{name}'"
+            )
+        if found is None or substance not in found.names:
+            return f"the scene has no {substance} in use (--substances {substance})"
+        if not found.has_volume[found.names.index(substance)]:
+            return f"no primitive brings {substance} anywhere: no container holds it"
+        if predicate in ("filled", "contains"):
+            if not self.contains(name):
+                return f"'{name}' is no container"
+            if substance == WATER and name in self.fillable:
+                return ""
+        elif predicate == "saturated" and not self.absorbs(name):
+            return f"'{name}' does not absorb what is poured or sprayed onto it"
+        elif predicate == "covered" and (self.absorbs(name) or found.row[self.index(name)] == len(found.covered)):
+            return f"'{name}' {'absorbs what covers others' if self.absorbs(name) else 'has no surface'}"
+        if substance == WATER and predicate == "saturated" and self.taps and not self.fixed(name):
+            return ""
+        others = [n for n in self.pourable if n != name]
+        return "" if others else f"no container can be carried to '{name}' to pour {substance} out of it"
 
     def _mover(self, condition: Condition) -> str | None:
         """The object to be moved so that a placement becomes true: the first argument, or where that is fixed and the
@@ -277,8 +336,10 @@ _CHANGES = {
     "frozen": True,
     "filled": True,
     "contains": True,
+    "saturated": True,
+    "covered": True,
 }
-"""Predicates of one object, or of a container and a substance, that primitives change, and to what (open and toggled_on
+"""Predicates of one object, or of an object and a substance, that primitives change, and to what (open and toggled_on
 both ways)."""
 
 SYMMETRIC = ("next_to", "in_contact_with")

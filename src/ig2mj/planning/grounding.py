@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.problem import Problem
-from ig2mj.planning.steps import PRIMITIVES, Step, make_step
+from ig2mj.planning.steps import PRIMITIVES, SUBSTANCE, Step, make_step
 from ig2mj.tasks.task import GROUND
 
 
 def named_things(domain: Domain, problem: Problem) -> list[str]:
-    """Objects that the problem names, and tools, knives, taps, sources of heat and cold."""
+    """Objects that the problem names, and tools, knives, taps, sources of heat and cold, containers of substances."""
     rooms = domain.model.tables.room_names
     names = [n for n in problem.named if n not in rooms and _category(domain, n) not in GROUND]
     sources = [s.name for s in domain.sources]
-    return list(dict.fromkeys([*names, *domain.tools, *domain.knives, *domain.taps, *sources]))
+    return list(dict.fromkeys([*names, *domain.tools, *domain.knives, *domain.taps, *sources, *domain.pourable]))
 
 
 def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
@@ -37,6 +38,7 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
         "scrub": [n for n in things if domain.has(n, "stainable")],
         "soak": [n for n in loose if domain.has(n, "soakable")],
         "fill": [n for n in loose if n in domain.fillable],
+        "pour": list(domain.pourable),
         "slice": [n for n in things if domain.has(n, "sliceable")],
         "cook": [n for n in loose if domain.has(n, "cookable")],
         "freeze": [n for n in loose if domain.has(n, "freezable")],
@@ -48,7 +50,9 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
         "soak": domain.taps,
         "fill": domain.taps,
         "slice": domain.knives,
+        "pour": [n for n in problem.named if n in things],
     }
+    substances = _substances(domain, problem)
     for primitive, kind in PRIMITIVES.items():
         first = able.get(primitive, loose)
         if len(kind.arguments) == 1:
@@ -58,7 +62,19 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
             others = second.get(primitive, things)
             if primitive in ("cook", "freeze"):
                 others = [s.name for s in (domain.heaters if primitive == "cook" else domain.coolers)(name)]
-            yield from (make_step(primitive, (name, other)) for other in others if other != name)
+            last = [(s,) for s in substances] if SUBSTANCE in kind.arguments else [()]
+            pairs = itertools.product(others, last)
+            yield from (make_step(primitive, (name, other, *more)) for other, more in pairs if other != name)
+
+
+def _substances(domain: Domain, problem: Problem) -> list[str]:
+    """Those that the goal names, or if it names none, all in use, as far as containers hold them."""
+    found = domain.model.substances
+    if found is None:
+        return []
+    able = [s for s, has in zip(found.names, found.has_volume, strict=True) if has]
+    named = {a for atom in problem.goal.atoms for a in atom.arguments}
+    return [s for s in able if s in named] or able
 
 
 def _category(domain: Domain, name: str) -> str:

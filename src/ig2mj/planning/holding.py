@@ -104,13 +104,17 @@ def hold_at(
             follows = world.follows(hand, world.turned_hand(hand, turned), standing, stance)
             return hand_path(standing, spheres, start, target, back, search=search, follows=follows) is not None
 
-        found = first_way(filter(has_room, candidates()), has_way, WAYS if world.body.opening is None else ARM_WAYS)
+        most = WAYS if world.body.opening is None else ARM_WAYS
+        found: _Holding | None = first_way(filter(has_room, candidates()), has_way, most)
         if found is None:
             return "no_path", [], -1
         stance, hold = found
         target, turned = aim(stance, hold)
         turned = turned @ about_vertical(now - stance.yaw)
-        if (yield from go(world, stance)):
+        stuck = yield from go(world, stance)
+        if name not in world.held:
+            return "slipped", [], -1
+        if stuck:
             continue
         planned = yield from from_home(world, hand, functools.partial(_way, world, name, hand, target, turned))
         if planned is not None:

@@ -154,7 +154,7 @@ class KinematicRung:
         return self._symbolic.facts(world)
 
     def begin(self, world: int, step: Step) -> None:
-        self._steps[world] = step
+        self._steps[world] = self.domain.meant(step)
 
     def ended(self, world: int) -> str | None:
         return None

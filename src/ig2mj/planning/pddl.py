@@ -11,6 +11,7 @@ import pathlib
 from collections.abc import Iterable, Sequence
 
 from ig2mj.knowledge.substances import WATER
+from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.steps import PLACE
 from ig2mj.planning.task_planner import TaskPlan
@@ -29,6 +30,7 @@ DOMAIN = """\
     (open ?o - thing) (toggled_on ?o - thing) (soaked ?o - thing) (dusty ?o - thing) (stained ?o - thing)
     (sliced ?o - thing) (cooked ?o - thing) (frozen ?o - thing)
     (filled ?o - thing ?l - substance) (contains ?o - thing ?l - substance) (container ?o - thing)
+    (covered ?o - thing ?l - substance) (saturated ?o - thing ?l - substance) (absorbs ?o - thing)
     (openable ?o - thing) (switched ?o - thing) (tool ?o - thing) (knife ?o - thing) (tap ?o - thing)
     (heats ?s ?o - thing) (cools ?s ?o - thing) (acts_inside ?s - thing) (needs_switch ?s - thing)
     (needs_closed ?s - thing))
@@ -71,6 +73,11 @@ DOMAIN = """\
   (:action fill :parameters (?o ?s - thing)
     :precondition (and (tap ?s) (container ?o) (held ?o) (or (toggled_on ?s) (not (switched ?s))))
     :effect (and (filled ?o water) (contains ?o water)))
+  (:action pour :parameters (?o ?t - thing ?l - substance)
+    :precondition (and (held ?o) (contains ?o ?l))
+    :effect (and (when (container ?t) (and (filled ?t ?l) (contains ?t ?l)))
+      (when (and (absorbs ?t) (not (container ?t))) (saturated ?t ?l))
+      (when (and (not (absorbs ?t)) (not (container ?t))) (covered ?t ?l))))
   (:action scrub :parameters (?o ?t - thing)
     :precondition (and (tool ?t) (held ?t) (soaked ?t))
     :effect (not (stained ?o)))
@@ -122,7 +129,9 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
     rooms += floors  # the home's floor object stands for any room
     things = [t for t in things if t not in floors]
     hands = [f"hand_{k}" for k in range(domain.hands)]
-    true = [a for a, value in facts.truth(_asked(conditions, things, around)).items() if value]
+    liquids = {a for c in conditions for a in c.arguments if a not in c.objects}
+    liquids |= {a for s in plan.steps for a in s.arguments if a not in s.things}
+    true = [a for a, value in facts.truth(_asked(domain, conditions, things, around, liquids)).items() if value]
     lines = [f"({a.predicate} {' '.join(a.arguments)})" for a in true]
     lines += [f"(in_hand {n} {hands[k]})" for k, n in enumerate(facts.held)]
     lines += [f"(held {n})" for n in facts.held]
@@ -132,6 +141,7 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
         lines += [f"({word} {n})" for n in things if domain.has(n, ability)]
     lines += [f"(tap {n})" for n in things if n in domain.taps]
     lines += [f"(container {n})" for n in things if domain.contains(n)]
+    lines += [f"(absorbs {n})" for n in things if domain.absorbs(n)]
     for source in (s for s in domain.sources if s.name in things):
         lines += [f"(heats {source.name} {n})" for n in things if source in domain.heaters(n)]
         lines += [f"(cools {source.name} {n})" for n in things if source in domain.coolers(n)]
@@ -139,7 +149,7 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
         flags["needs_closed"] = source.needs_closed and domain.opens(source.name)
         lines += [f"({word} {source.name})" for word, is_so in flags.items() if is_so]
     goal = [str(c) for c in conditions]
-    others = {a for c in conditions for a in c.arguments if a not in c.objects} - {WATER}  # a constant of the domain
+    others = liquids - {WATER}  # a constant of the domain
     return "\n".join(
         [
             *(f"; {k + 1}. {step}" for k, step in enumerate(plan.steps)),
@@ -165,11 +175,18 @@ def write_pddl(folder: pathlib.Path, name: str, facts: Facts, plan: TaskPlan) ->
     (folder / "problem.pddl").write_text(problem_pddl(name, facts, plan), encoding="utf-8")
 
 
-def _asked(conditions: Sequence[Condition], things: Sequence[str], around: Iterable[str]) -> list[Atom]:
-    """Atoms that are stated where they are true: those of the goal, and states and containers of all things."""
+def _asked(
+    domain: Domain,
+    conditions: Sequence[Condition],
+    things: Sequence[str],
+    around: Iterable[str],
+    liquids: Iterable[str],
+) -> list[Atom]:
+    """Atoms that are stated where they are true: those of the goal, and states, containers and contents of things."""
     atoms = [c.atom for c in conditions]
     atoms += [Atom(p, (t,)) for t in things for p in ("open", "toggled_on", "soaked", "dusty", "stained", "sliced")]
     atoms += [Atom("inside", (t, c)) for t in things for c in around if t != c]
+    atoms += [Atom("contains", (t, s)) for t in things if domain.contains(t) for s in sorted(liquids)]
     return atoms
 
 

@@ -120,14 +120,12 @@ class PhysicsRung:
             name = self.stage.scene.tables.agent_names[self.stage.agent]
             lacks = "has no hand" if not len(self.body.hands) else "has no hand whose motion can be planned"
             raise UnsupportedPrimitive(f"robot '{name}' {lacks}: '{step.primitive}' takes one (humanoid has two)")
-        rooms = self.domain.model.tables.room_names
-        for name in step.arguments:
-            if name not in rooms:
-                self.domain.index(name)
+        self.domain.check(step)
 
     def begin(self, world: int, step: Step) -> None:
         """See `Rung.begin`. Raises as `check`."""
         self.check(step)
+        step = self.domain.meant(step)
         self._count[world] += 1
         self._steps[world], self._planning[world] = 0, 0.0
         self._asked[world] = step
@@ -141,7 +139,7 @@ class PhysicsRung:
         """What another robot holds of what a primitive needs, in words; "" for nothing."""
         tables, held = self.domain.model.tables, np.asarray(self.stage.view.held)[world]
         others = [h for h in range(len(held)) if h not in self.body.hands]
-        for name in step.arguments if step.primitive != "navigate_to" and others else ():
+        for name in step.things if step.primitive != "navigate_to" and others else ():
             if name in tables.object_names and (hands := np.flatnonzero(held[others, self.domain.index(name)])).size:
                 robot = tables.agent_names[int(tables.hand_agent[others[int(hands[0])]])]
                 return f"{name} is held by robot '{robot}' (let it release it first)"

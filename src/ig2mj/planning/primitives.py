@@ -18,6 +18,7 @@ from ig2mj.planning.grasping import grasp, is_graspable, release
 from ig2mj.planning.moves import Primitive, PrimitiveFailed
 from ig2mj.planning.opening import set_open
 from ig2mj.planning.placing import bring_out, place
+from ig2mj.planning.pouring import pour
 from ig2mj.planning.pushing import push
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
@@ -88,6 +89,7 @@ ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {
     "scrub": clean("stained"),
     "soak": soak,
     "fill": fill,
+    "pour": pour,
     "slice": slice_,
     "cook": cook,
     "freeze": freeze,

@@ -18,6 +18,7 @@ from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import UnknownNameError
 from ig2mj.knowledge.substances import substances
 from ig2mj.planning.steps import PlanningError
+from ig2mj.planning.supplies import RECEIVED
 from ig2mj.predicates import logic
 from ig2mj.predicates.compile import CompiledExpression, compile_expression
 from ig2mj.predicates.host_queries import HostQueries
@@ -28,6 +29,7 @@ from ig2mj.scene.paths import SHIPPED_HOMES
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.scene.substance_requests import substances_as_text
 from ig2mj.states.model import StateModel
+from ig2mj.states.substances.model import ALWAYS
 from ig2mj.tasks.bddl.definitions import activity_names
 from ig2mj.tasks.bddl.goal import conditions
 from ig2mj.tasks.bddl.start import load_bound
@@ -100,7 +102,7 @@ def problem_of(
 
     Args:
       what: an activity of BEHAVIOR or of the paper, a home that ships, or a folder of a scene.
-      goal: expression; None: that of the activity. Substances that it wants in containers are in use.
+      goal: expression; None: that of the activity. Substances that it wants in or on objects are in use.
       objects: what is added to a home, and changed in it (`load_scene`).
       home: of an activity of BEHAVIOR, in place of its own; None: its own.
       in_use: substances that are in use in a scene whatever its goal wants; an activity has its own.
@@ -143,9 +145,10 @@ def problem_of(
 
 
 def _filling(goal: str) -> list[str]:
-    """Substances that a goal wants in containers. Raises ExpressionError, UnknownNameError as `compile_expression`."""
-    found = [a.arguments[-1] for a in logic.atoms(parse(goal)) if a.predicate in ("filled", "contains")]
-    return list(dict.fromkeys(name for name in found if name in substances()))
+    """Substances that a goal wants in containers, or in or on objects. Raises ExpressionError, UnknownNameError as
+    `compile_expression`."""
+    found = [a.arguments[-1] for a in logic.atoms(parse(goal)) if a.predicate in RECEIVED]
+    return list(dict.fromkeys(name for name in found if name in substances() and name not in ALWAYS))
 
 
 def _compiled(model: StateModel, goal: str | Expression) -> CompiledExpression:

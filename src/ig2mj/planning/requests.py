@@ -15,7 +15,7 @@ import numpy as np
 from ig2mj.knowledge.substances import WATER
 from ig2mj.knowledge.taxonomy import is_a
 from ig2mj.planning.domain import Domain
-from ig2mj.planning.steps import PRIMITIVES, Step
+from ig2mj.planning.steps import PRIMITIVES, SUBSTANCE, Step
 from ig2mj.sampling.conditions import Condition
 from ig2mj.scene.substance_requests import substances_as_text
 
@@ -87,6 +87,7 @@ class RequestSource:
         first = {
             "soak": [n for n in self._loose if domain.has(n, "soakable")] + [self._rag],
             "fill": [n for n in self._loose if n in domain.fillable],
+            "pour": [n for n in self._loose if n in domain.pourable],
             "slice": [n for n in self._loose if domain.has(n, "sliceable")] + [self._fruit],
             "cook": [n for n in self._loose if domain.has(n, "cookable")] + [self._meat],
             "freeze": [n for n in self._loose if domain.has(n, "freezable")] + [self._fruit],
@@ -105,6 +106,7 @@ class RequestSource:
             "slice": [self._knife],
             "soak": domain.taps,
             "fill": domain.taps,
+            "pour": self._things,
         }
         if primitive in ("cook", "freeze"):
             sources = domain.heaters(name) if primitive == "cook" else domain.coolers(name)
@@ -112,7 +114,8 @@ class RequestSource:
         if primitive not in second:
             return (name,) if name else None
         other = _one(second[primitive], rng)
-        return (name, other) if name and other else None
+        last = (WATER,) if SUBSTANCE in PRIMITIVES[primitive].arguments else ()
+        return (name, other, *last) if name and other else None
 
     def _with(self, ability: str) -> list[str]:
         return [n for n in self._things if self._domain.has(n, ability)]
@@ -143,6 +146,8 @@ class RequestSource:
             return [], (second,)
         if primitive in ("soak", "fill"):
             return self._running(second), (name,)
+        if primitive == "pour":
+            return [true("filled", name, WATER)], (name,)
         if primitive in ("cook", "freeze"):
             source = next(s for s in self._domain.sources if s.name == second)
             before = self._running(second) if source.needs_switch else []

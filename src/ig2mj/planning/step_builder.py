@@ -1,14 +1,14 @@
 """`StepBuilder`: the steps that make the literals of a reading true in one world, with what they need first.
 
-What shuts an object in is opened, a tap runs before a tool is soaked or a container filled, a tool is soaked before it
-scrubs, a knife is taken before it cuts, hands that are full put something down. Steps that failed choose another tool,
-tap or support.
+What shuts an object in is opened, a tap runs before a tool is soaked or a container filled, what holds a substance is
+taken before it is poured, a tool is soaked before it scrubs, a knife is taken before it cuts, hands that are full put
+something down. Steps that failed choose another tool, tap, container or support.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -16,7 +16,11 @@ from ig2mj.planning.domain import SYMMETRIC, HeatSource
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.step_order import LATER, ordered
 from ig2mj.planning.steps import PLACE, Step
+from ig2mj.planning.supplies import RECEIVED, Supply, supplies
 from ig2mj.sampling.conditions import Condition
+
+SUPPLIES = ("fill", "soak", "pour")
+"""Primitives that bring a substance into or onto an object."""
 
 CLEARED = 2
 """Failures of bringing a container out onto the floor after which it is left where it is."""
@@ -72,8 +76,8 @@ class StepBuilder:
         elif c.predicate == "soaked":
             for part in self._parts(name, c):
                 self._soak(part)
-        elif c.predicate in ("filled", "contains"):
-            self._fill(name)
+        elif c.predicate in RECEIVED:
+            self._supply(c)
         elif c.predicate == "cooked":
             for part in self._parts(name, c):
                 self._cook(part)
@@ -223,10 +227,38 @@ class StepBuilder:
         self._hold_below_tap("soak", name)
         self._wet.add(name)
 
-    def _fill(self, name: str) -> None:
-        """Fills a container, once where several conditions ask for it."""
-        if not any(s.primitive == "fill" and s.object == name for s in self.steps):
-            self._hold_below_tap("fill", name)
+    def _supply(self, c: Condition) -> None:
+        """Brings a substance into or onto an object, once where several conditions ask for it."""
+        name, substance = c.arguments
+        for step in self.steps:
+            if step.primitive in SUPPLIES and any(a.arguments == c.arguments for a in (*step.adds, step.serves) if a):
+                return
+        found = supplies(self._facts, c, self._required)
+
+        def failures(s: Supply) -> int:
+            if s.primitive in ("fill", "soak"):
+                return self._failures((s.primitive, name, s.source), ("toggle_on", s.source))
+            about = (s.source, name, substance) if s.primitive == "pour" else (name, s.source, substance)
+            return self._failures(("grasp", s.source), (s.primitive, *about), ("fill", s.source, s.tap))
+
+        if not found:
+            return
+        fewest = min(map(failures, found))
+        chosen = next(s for s in found if failures(s) == fewest)
+        if chosen.primitive in ("fill", "soak"):
+            self._hold_below_tap(chosen.primitive, name)
+            return
+        if chosen.tap:
+            self._hold_below_tap("fill", chosen.source)
+        self._reach(name)
+        if name in self._held:
+            near = min(self._domain.supports, key=self._far_from(name), default="")
+            self._put(*(("place_on_top", name, near) if near else ("place_on_floor", name, self._facts.room(name))))
+        self._take(chosen.source)
+        self._add("pour", chosen.source, name, substance, also=(c,))
+
+    def _far_from(self, name: str) -> Callable[[str], float]:
+        return lambda other: float(np.linalg.norm(self._facts.place(other) - self._facts.place(name)))
 
     def _hold_below_tap(self, primitive: str, name: str) -> None:
         taps = self._domain.taps

@@ -1,6 +1,6 @@
 """In which order the literals of a reading are made true: what depends on what comes first.
 
-1. what is opened for its own sake; what is cut, cleaned, soaked, cooked and filled, where it stands;
+1. what is opened for its own sake; what is cut, cleaned, soaked, cooked, filled and covered, where it stands;
 2. what is taken away, then what is placed: supports before what they bear, large things before small ones;
 3. what is frozen;
 4. what is switched and shut.
@@ -19,7 +19,7 @@ from ig2mj.sampling.conditions import Condition
 LATER, GIVE_UP = 2, 6
 """Failures of a condition after which the others come first, and after which no step is planned for it."""
 
-FIRST = ("sliced", "dusty", "stained", "soaked", "cooked", "contains", "filled")
+FIRST = ("sliced", "dusty", "stained", "soaked", "saturated", "cooked", "contains", "filled", "covered")
 """Predicates that come before placements, in this order."""
 
 

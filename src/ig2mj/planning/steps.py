@@ -38,6 +38,7 @@ class Primitive:
     Attributes:
       name: verb. arguments: what each argument is. before: what must hold first. until: what ends it with success.
       adds: conditions that hold afterwards, with `?0`, `?1` for the arguments, and names of substances.
+      one_of: conditions of which one holds afterwards; which, the step says itself (`Step.also`, `Domain.meant`).
     """
 
     name: str
@@ -45,11 +46,12 @@ class Primitive:
     before: str
     until: str
     adds: tuple[tuple[str, ...], ...] = ()
+    one_of: tuple[tuple[str, ...], ...] = ()
 
     @property
     def makes(self) -> tuple[str, ...]:
         """Predicates of the conditions that hold afterwards, or are false."""
-        return tuple(template[template[0] == "not"] for template in self.adds)
+        return tuple(template[template[0] == "not"] for template in (*self.adds, *self.one_of))
 
 
 _PRIMITIVES = (
@@ -99,6 +101,13 @@ _PRIMITIVES = (
         "fill", ("object", "source"), "the object, a container, is in a hand; the water runs", "filled(object, water)",
         (("filled", "?0", "water"),),
     ),
+    Primitive(
+        "pour", ("object", "target", "substance"), "the object, which contains the substance, is in a hand",
+        "contains(target, substance); of what absorbs, saturated; of anything else, covered",
+        one_of=(
+            ("contains", "?1", "?2"), ("filled", "?1", "?2"), ("saturated", "?1", "?2"), ("covered", "?1", "?2"),
+        ),
+    ),
     Primitive("slice", ("object", "knife"), "the knife is in a hand", "sliced(object)", (("sliced", "?0"),)),
     Primitive(
         "cook", ("object", "source"), "the source is on; the object is in a hand, or inside a source that acts inside",
@@ -113,6 +122,9 @@ _PRIMITIVES = (
         (("in_contact_with", "?0", "?1"),),
     ),
 )  # fmt: skip
+
+SUBSTANCE = "substance"
+"""What an argument is that names neither an object nor a room."""
 
 PRIMITIVES: dict[str, Primitive] = {p.name: p for p in _PRIMITIVES}
 
@@ -134,7 +146,7 @@ class Step:
 
     Attributes:
       primitive: name of one of `PRIMITIVES`. arguments: names of objects and rooms.
-      also: further conditions on the object that is placed, which must hold afterwards, too.
+      also: further conditions on the object that is placed, or that gets a substance, which must hold afterwards, too.
       serves: the condition of the goal that it is for; None: it was asked for by itself.
     """
 
@@ -149,14 +161,22 @@ class Step:
         return self.arguments[0]
 
     @property
+    def things(self) -> tuple[str, ...]:
+        """Its arguments without substances: objects and rooms."""
+        roles = PRIMITIVES[self.primitive].arguments
+        return tuple(a for a, role in zip(self.arguments, roles, strict=True) if role != SUBSTANCE)
+
+    @property
     def adds(self) -> tuple[Condition, ...]:
         """Conditions that hold when it is done, those of `also` among them."""
-        found = []
-        for template in PRIMITIVES[self.primitive].adds:
-            value = template[0] != "not"
-            name, *places = template if value else template[1:]
-            found.append(Condition(name, tuple(map(self._argument, places)), value))
+        found = [self.condition(template) for template in PRIMITIVES[self.primitive].adds]
         return (*found, *(c for c in self.also if c not in found))
+
+    def condition(self, template: Sequence[str]) -> Condition:
+        """A template of its primitive with its arguments."""
+        value = template[0] != "not"
+        name, *places = template if value else template[1:]
+        return Condition(name, tuple(map(self._argument, places)), value)
 
     def _argument(self, word: str) -> str:
         return self.arguments[int(word[1:])] if word.startswith("?") else word

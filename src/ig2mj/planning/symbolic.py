@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import collections
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import jax
 import numpy as np
@@ -27,6 +27,7 @@ from ig2mj.sampling.many import make_sampler
 from ig2mj.sampling.placement import Rejections
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.row import RowSampler
+from ig2mj.sampling.substance_setters import brought
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.pool import Pool
@@ -79,7 +80,7 @@ class SymbolicRung:
         return Facts(self._domain, own.states, self._sampler.query.view, held=own.held)
 
     def begin(self, world: int, step: Step) -> None:
-        self._worlds[world].step = step
+        self._worlds[world].step = self._domain.meant(step)
 
     def ended(self, world: int) -> str | None:
         return None
@@ -136,10 +137,11 @@ class SymbolicRung:
 
     def _lacking(self, step: Step, facts: Facts, held: Sequence[str]) -> str:
         """What of the primitive's preconditions is false, in words."""
-        name, kind = step.object, step.primitive
+        name, kind, last = step.object, step.primitive, step.arguments[-1]
         second = step.arguments[1] if len(step.arguments) > 1 else ""
         acting = second if kind in ("cook", "freeze") else ""  # it acts on what is shut in it
-        around = facts.containers(name) if name not in held and kind not in ("navigate_to", "release") else ()
+        about = second if kind == "pour" else name
+        around = facts.containers(about) if about not in held and kind not in ("navigate_to", "release") else ()
         shut = [c for c in around if c != acting and not facts.holds("open", c)]
         if kind == "grasp":
             if name in held:
@@ -152,14 +154,16 @@ class SymbolicRung:
                 return f"{name} is fixed"
         if kind in ("open", "close", "push") and self._domain.hands_taken(held) >= self._domain.hands:
             return f"the hands are full: {', '.join(held)}"
-        if (kind.startswith("place_") or kind in ("release", "soak", "fill")) and name not in held:
+        if (kind.startswith("place_") or kind in ("release", "soak", "fill", "pour")) and name not in held:
             return f"no hand holds {name}"
         if kind in ("wipe", "scrub", "slice") and second not in held:
             return f"no hand holds {second}"
         if kind == "scrub" and not facts.holds("soaked", second):
             return f"{second} is not soaked"
-        if kind == "fill" and (why := self._domain.impossible(step.adds[0])):
+        if kind in ("fill", *BRINGS) and (why := self._domain.impossible(step.adds[0])):
             return why
+        if kind in BRINGS and not facts.holds("contains", tool := BRINGS[kind](step), last):
+            return f"{tool} contains no {last}"
         if (
             kind in ("soak", "fill")
             and self._domain.has(second, "toggleable")
@@ -171,7 +175,7 @@ class SymbolicRung:
         if kind in ("cook", "freeze") and (why := self._not_acting(name, second, facts, held)):
             return why
         if shut:
-            return f"{name} is shut in {', '.join(shut)}"
+            return f"{about} is shut in {', '.join(shut)}"
         return ""
 
     def _not_acting(self, name: str, source: str, facts: Facts, held: Sequence[str]) -> str:
@@ -202,6 +206,8 @@ class SymbolicRung:
         self, world: int, own: _SymbolicWorld, step: Step, conditions: Sequence[Condition] | None = None
     ) -> Outcome | None:
         """The failure, or None: the world is changed so that what the step adds holds."""
+        if step.primitive in BRINGS and conditions is None:
+            return self._bring(own, step)
         rng = np.random.default_rng([self._seed, self._first + world, own.count])
         rejected: Rejections = collections.Counter()
         self._sampler.start_from(own.physics, own.states)
@@ -216,6 +222,21 @@ class SymbolicRung:
             return Outcome("not_true_after", often or "the sampler found nothing")
         own.physics, own.states = row.physics, row.states
         return None
+
+    def _bring(self, own: _SymbolicWorld, step: Step) -> Outcome | None:
+        """The failure, or None: what holds a substance has given as much as the step asks for."""
+        model, index, tool = self._domain.model, self._domain.index, BRINGS[step.primitive](step)
+        try:
+            for wish in step.adds:
+                name, substance = wish.arguments
+                own.states = brought(model, own.states, index(tool), wish.predicate, index(name), substance)
+        except StateError as e:
+            return Outcome("not_true_after", str(e))
+        return None
+
+
+BRINGS: dict[str, Callable[[Step], str]] = {"pour": lambda step: step.arguments[0]}
+"""Primitives that bring a substance somewhere -> what holds it."""
 
 
 def symbolic_episodes(

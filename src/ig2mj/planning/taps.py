@@ -40,6 +40,8 @@ def hold_below_tap(
     for _ in range(WAYS + MOST_MOVED):
         left = lambda hand=hand: [h for h in holds(hand, source) if h.number not in failed]  # noqa: E731
         reason, way, number = yield from hold_at(world, name, hand, left)
+        if reason == "slipped" and name not in world.held:
+            return Outcome(reason, f"the hand lost {name}")
         if number < 0 and (yield from clear_basin(world, source, moved)) and name in world.held:
             continue
         if number < 0 and not again and (yield from regrasp(world, name, hand)):  # by another side

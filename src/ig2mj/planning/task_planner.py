@@ -21,6 +21,7 @@ from ig2mj.planning.exclusion import incompatible
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.step_builder import StepBuilder
 from ig2mj.planning.steps import PlanningError, Step
+from ig2mj.planning.supplies import lacking
 from ig2mj.predicates import logic
 from ig2mj.predicates.cheapest import Cost, Incompatible, cheapest, contradiction
 from ig2mj.predicates.compile import CompiledExpression
@@ -34,7 +35,9 @@ STEPS_OF = {
     "dusty": 2.5,
     "soaked": 3.0,
     "contains": 3.0,
+    "covered": 3.0,
     "filled": 3.0,
+    "saturated": 3.0,
     "cooked": 4.0,
     "frozen": 4.0,
     "stained": 4.5,
@@ -103,7 +106,7 @@ class TaskPlanner:
             condition = condition_of(atom, required)
             if truth[atom] == required:
                 return 0.0
-            if self._reason(condition):
+            if self._reason(condition, facts):
                 return math.inf
             steps = STEPS_OF.get(condition.predicate, PLACING)
             return steps + FAILED * min(failed.get(condition, 0), REMEMBERED)
@@ -111,30 +114,30 @@ class TaskPlanner:
         together = functools.partial(incompatible, facts)
         value, reading = cheapest(self.goal.ground, cost, incompatible=together)
         if math.isinf(value):
-            raise PlanningError(f"the goal cannot become true: {self._why_not(truth, cost, together)}")
+            raise PlanningError(f"the goal cannot become true: {self._why_not(facts, truth, cost, together)}")
         required = tuple(condition_of(atom, required) for atom, required in reading.items())
         missing = tuple(condition_of(atom, required) for atom, required in reading.items() if truth[atom] != required)
         return TaskPlan(
             tuple(StepBuilder(facts, required, missing, failed, begun, stuck, failed_steps).steps), missing, required
         )
 
-    def _reason(self, condition: Condition) -> str:
+    def _reason(self, condition: Condition, facts: Facts) -> str:
         if condition not in self._impossible:
             self._impossible[condition] = self.domain.impossible(condition)
-        return self._impossible[condition]
+        return self._impossible[condition] or lacking(facts, condition)
 
-    def _why_not(self, truth: Mapping[Atom, bool], cost: Cost, together: Incompatible) -> str:
+    def _why_not(self, facts: Facts, truth: Mapping[Atom, bool], cost: Cost, together: Incompatible) -> str:
         """The first literal whose impossibility keeps the goal from becoming true, or literals that exclude each
         other."""
 
         def barred(atom: Atom, required: bool) -> bool:
-            return truth[atom] != required and bool(self._reason(condition_of(atom, required)))
+            return truth[atom] != required and bool(self._reason(condition_of(atom, required), facts))
 
         value, reading = cheapest(self.goal.ground, lambda atom, required: float(barred(atom, required)))
         for atom, required in reading.items():
             if not math.isinf(value) and barred(atom, required):
                 condition = condition_of(atom, required)
-                return f"{condition} is false, and {self._reason(condition)}"
+                return f"{condition} is false, and {self._reason(condition, facts)}"
         if (atom := contradiction(self.goal.ground, cost)) is not None:
             return f"{logic.text(atom)} would have to be both true and false"
         if excluding := together(reading):

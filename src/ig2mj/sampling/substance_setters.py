@@ -14,13 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from ig2mj.errors import StateError
+from ig2mj.knowledge.substances import FILL, WATER
+from ig2mj.states.definitions import wetness
 from ig2mj.states.model import StateModel
 from ig2mj.states.substances import coat, volume
 from ig2mj.states.substances.model import of
 from ig2mj.states.world import ExtendedStates
-
-FILL = 0.6
-"""Share of a container's litres."""
 
 SOME = 0.1
 """The same."""
@@ -92,6 +91,50 @@ def _empty(model: StateModel, states: ExtendedStates, obj: int, substance: str |
         states,
         stock=xp.where(own, False, states.stock),
         volume=xp.where(own, np.float32(0.0), states.volume),
+    )
+
+
+def brought(
+    model: StateModel, states: ExtendedStates, source: int, predicate: str, obj: int, substance: str
+) -> ExtendedStates:
+    """The states after a container gave an object as much of a substance as makes a predicate true.
+
+    Args:
+      source: number of the container, which has so much less, unless it is a source. predicate: contains, filled,
+        covered or saturated. obj: number of the object that gets it.
+
+    Raises:
+      StateError: the container has too little, or what the setter of the predicate raises.
+    """
+    row, column, found = _row(model, source), _column(model, substance), of(model)
+    before = np.asarray(states.volume)[0, :, column].astype(float)
+    endless = bool(np.asarray(states.stock)[0, row, column])
+    if before[row] < volume.CONTAINS and not endless:
+        raise StateError(f"'{model.tables.object_names[source]}' contains no {substance}")
+    if predicate in ("contains", "filled"):
+        target = _row(model, obj)
+        after = np.asarray(SUBSTANCE_SETTERS["filled"](model, states, obj, substance, True).volume)[0, target, column]
+        given = max(float(after) - before[target], 0.0) if endless else min(float(after) - before[target], before[row])
+        states = volume.set_volume(model, states, obj, substance, before[target] + given)
+        least = volume.FILLED * float(found.containers.litres[target]) if predicate == "filled" else volume.CONTAINS
+        if before[target] + given < least:
+            raise StateError(f"'{model.tables.object_names[source]}' contains too little {substance}")
+        lost = 0.0
+    else:
+        drops = float(model.parameters.wetness_soaked[obj]) if predicate == "saturated" else 1.0
+        given = lost = coat.DROP * drops
+        if given > before[row] and not endless:
+            raise StateError(f"'{model.tables.object_names[source]}' contains too little {substance}")
+        if predicate == "saturated" and substance == WATER:
+            mask = np.arange(model.tables.num_objects) == obj
+            states = dataclasses.replace(states, wetness=wetness.set_soaked(model, states.wetness, mask[None], True))
+        else:
+            states = SUBSTANCE_SETTERS[predicate](model, states, obj, substance, True)
+    own = np.arange(len(found.names)) == column
+    return dataclasses.replace(
+        volume.set_volume(model, states, source, substance, before[row] if endless else before[row] - given),
+        lost=np.asarray(states.lost) + np.where(own, np.float32(lost), 0.0).astype(np.float32),
+        drawn=np.asarray(states.drawn) + np.where(own & endless, np.float32(given), 0.0).astype(np.float32),
     )
 
 

@@ -170,6 +170,7 @@ class Manifest(msgspec.Struct, omit_defaults=True):
     task: dict[str, Any] | None = None
     substances: list[str] = []  # in use, by the names of `ig2mj.knowledge.substances`
     extras: list[str] = []  # further states that it has (`ig2mj.scene.extras`)
+    contents: list[str] = []  # what containers are filled with at the start, "milk@carton_0"
 
 
 def load_manifest(path: str | os.PathLike) -> Manifest:

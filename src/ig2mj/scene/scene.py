@@ -40,7 +40,14 @@ from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
 from ig2mj.scene.physics_digest import physics_digest
 from ig2mj.scene.rooms import Rooms, load_rooms
 from ig2mj.scene.start_overlap import check_start
-from ig2mj.scene.substance_requests import check_substances, read_substances, substances_as_text
+from ig2mj.scene.substance_requests import (
+    check_substances,
+    read_substances,
+    requested_substances,
+    split_contents,
+    substances_as_text,
+    with_contents,
+)
 from ig2mj.scene.tables import SceneTables
 from ig2mj.scene.walls import deepen_walls
 
@@ -114,7 +121,7 @@ class Scene:
     def changes_as_text(self) -> list[str]:
         """`requested` without the additions."""
         extras = extras_as_text(self.manifest.extras)
-        return [*substances_as_text(self.substances), *extras, *(change.text for change in self.changes)]
+        return [*requested_substances(self.manifest), *extras, *(change.text for change in self.changes)]
 
     @property
     def name(self) -> str:
@@ -142,6 +149,8 @@ class Scene:
         if self.substances:
             insides = [(o.name, o.inside) for o in self.manifest.objects if o.inside is not None]
             hashed.update(msgspec.json.encode([self.substances, insides]))
+        if self.manifest.contents:
+            hashed.update(msgspec.json.encode(self.manifest.contents))
         if pairs := pairs_of(self.manifest.extras):
             hashed.update(msgspec.json.encode([p if p.place else (p.child, p.parent) for p in pairs]))
         return _known_digests().get(hashed.hexdigest(), hashed.hexdigest())
@@ -260,7 +269,8 @@ def load_scene(
         It is fixed to the house if the old one was. What stood on the old one is put down on the new one where that
         has room for it, and is taken out where not.
       substances: names of what can fill containers and cover objects, next to those that the manifest names
-        (`ig2mj.knowledge.substances`); "substances:water,salt" in `objects` says the same.
+        (`ig2mj.knowledge.substances`); "substances:water,salt" in `objects` says the same. With a container
+        ("milk@carton_0") that is filled with it at the start.
       looks: how it is shown: "day" or "night", with wallpapers, curtains, lamps, plants and a garden that are visual
         only, or "plain", as its files have it. Physics, objects and hashes are the same.
 
@@ -281,7 +291,9 @@ def load_scene(
         warn_user(f"{file.parent}: of an older format, in which containers hold nothing ({fix})", OldFormatWarning)
     named, others = read_substances([*substances_as_text(_listed(substances)), *_listed(objects)])
     if named:
-        home = msgspec.structs.replace(home, substances=list(dict.fromkeys((*home.substances, *named))))
+        names, contents = split_contents(named)
+        names, contents = dict.fromkeys((*home.substances, *names)), dict.fromkeys((*home.contents, *contents))
+        home = msgspec.structs.replace(home, substances=list(names), contents=list(contents))
     check_substances(home.substances)
     extras, others = read_extras(others)
     if extras:
@@ -355,6 +367,7 @@ def _load(
     else:
         spec = read_spec(file)
     _make_solid(spec, manifest, folder)
+    manifest = with_contents(manifest)
     if agents:
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *_attach_all(agents, spec, manifest)]

@@ -6,7 +6,8 @@ Worlds of other sources have no robot that carries out primitives.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Protocol, runtime_checkable
 
 import mujoco
@@ -22,6 +23,7 @@ from ig2mj.planning.solver import EpisodeResult, Solving, StepRecord
 from ig2mj.planning.stage import CoreStage
 from ig2mj.planning.starts import open_doors, scene_with_robot
 from ig2mj.planning.steps import PRIMITIVES, Outcome, make_step
+from ig2mj.planning.supplies import held_substances
 from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
 from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.scene.scene import Scene
@@ -164,7 +166,8 @@ class Planned:
 
     def offered(self, name: str) -> dict[str, tuple[str, ...]]:
         """Requests that an object can be part of, by the texts of their buttons."""
-        return offers(self._rung.domain, name, self.report.held)
+        facts = self._rung.facts(0)
+        return offers(self._rung.domain, name, self.report.held, {n: held_substances(facts, n) for n in facts.held})
 
     def ask(self, words: Sequence[str]) -> None:
         self._result = None
@@ -230,11 +233,14 @@ class Planned:
         self.report = PlanReport(tuple(rows), tuple(held), running is not None, self._solving is not None, note or "")
 
 
-def offers(domain: Domain, name: str, held: Sequence[str]) -> dict[str, tuple[str, ...]]:
+def offers(
+    domain: Domain, name: str, held: Sequence[str], contents: Mapping[str, Sequence[str]] = MappingProxyType({})
+) -> dict[str, tuple[str, ...]]:
     """Requests that make sense for an object, by the texts of buttons.
 
     Args:
       held: names of what the robot holds, the first of which is placed, or used as a tool.
+      contents: substances in what it holds.
     """
     found: dict[str, tuple[str, ...]] = {"Go to": ("navigate_to", name)}
     if name in held:
@@ -258,6 +264,8 @@ def offers(domain: Domain, name: str, held: Sequence[str]) -> dict[str, tuple[st
         found[f"Soak {tool}"] = ("soak", tool, name)
     if tool in domain.fillable and domain.has(name, "waterSource"):
         found[f"Fill {tool}"] = ("fill", tool, name)
+    for substance in contents.get(tool, ()):
+        found[f"Pour {substance} out of {tool}"] = ("pour", tool, name, substance)
     if domain.has(tool, "cookable") and domain.has(name, "heatSource"):
         found[f"Cook {tool}"] = ("cook", tool, name)
     return {text: words for text, words in found.items() if words[0] in PRIMITIVES}

@@ -37,10 +37,10 @@ def run_script(
     bare = load_home(home, objects)
     rooms = bare.tables.room_names
     for step in steps:
-        for name in step.arguments:
+        for name in step.things:
             if name not in rooms:
                 bare.object_index(name)
-    near = [n for n in steps[0].arguments if n not in rooms] if steps else []
+    near = [n for n in steps[0].things if n not in rooms] if steps else []
     x, y = start_place(bare, SceneQuery(bare).view, near)
     scene = load_scene(home, [make_robot(robot).at(x, y, 0.0)], objects)
     simulation = Simulation(scene, grasping="assisted", seed=seed)

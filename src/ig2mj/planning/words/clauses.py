@@ -11,11 +11,12 @@ from ig2mj.planning.facts import Facts
 from ig2mj.planning.steps import PRIMITIVES, Step, make_step
 from ig2mj.planning.words.instruction import Instruction
 from ig2mj.planning.words.nouns import Lexicon, NotUnderstoodError, Phrase, Reader, choose
-from ig2mj.planning.words.treatment import treatment
+from ig2mj.planning.words.treatment import pouring, treatment
 from ig2mj.planning.words.verbs import (
     ADJECTIVES,
     CARRY,
     FILLERS,
+    FROM,
     GET,
     LONGEST,
     OPENERS,
@@ -130,6 +131,8 @@ class _Clauses:
             self._fillers()
             self.reader.take("over to", "to", "towards", "into", "over")
             self._each("navigate_to", self._objects())
+        elif kind == "pour":
+            self._pour()
         else:
             self._treat(kind)
 
@@ -254,6 +257,35 @@ class _Clauses:
         said = self._with(kind)
         for name in names:
             self.steps.append(treatment(self.lexicon.facts, kind, name, said))
+
+    def _pour(self) -> None:
+        """ "the milk into the mug", "water from the jug over the plant", "the jug into the bowl"."""
+        reader, facts = self.reader, self.lexicon.facts
+        substance, source = self._substance(), ""
+        if not substance:
+            (source,) = self._names(self._objects("a container or a substance", single=True), "held")[:1]
+        elif reader.take(*FROM):
+            (source,) = self._names(self._objects("a container", single=True), "held")[:1]
+        self._fillers()
+        if not reader.take("into", "in", "inside", "onto", "on top of", "on", "over", "to"):
+            raise self._unknown("'into' or 'over'")
+        (target,) = self._target(moved=[source])
+        self.steps.append(pouring(facts, source, target, substance))
+        self.mentioned.append(Phrase("it", (target,), 0))
+
+    def _substance(self) -> str:
+        """A substance in use that is named here and followed by where it goes or comes from, which is passed; "":
+        none."""
+        reader, began = self.reader, self.reader.at
+        used = self.domain.model.substances
+        reader.take("the", "some", "a bit of", "some of the", "all of the", "all the")
+        for name in sorted(() if used is None else used.names, key=len, reverse=True):
+            if reader.take(name.replace("_", " ").replace("  ", " ")):
+                if any(reader.sees(text) for text in (*FROM, "into", "in", "inside", "onto", "on", "over", "to")):
+                    return name
+                break
+        reader.at = began
+        return ""
 
     def _with(self, kind: str) -> str:
         """The tool or source that is named after an object; "": none."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import msgspec
 
 from ig2mj.errors import InputError, UnknownNameError
-from ig2mj.planning.steps import PRIMITIVES, Step, make_step
+from ig2mj.planning.steps import PRIMITIVES, SUBSTANCE, Step, make_step
 from ig2mj.scene.tables import SceneTables
 
 MOST_BYTES, MOST_REQUESTS = 1 << 20, 10_000
@@ -23,15 +23,16 @@ class _Request(msgspec.Struct, forbid_unknown_fields=True):
     arguments: dict[str, str] = {}
 
 
-def tools(tables: SceneTables | None = None) -> list[dict[str, Any]]:
+def tools(tables: SceneTables | None = None, substances: Sequence[str] | None = None) -> list[dict[str, Any]]:
     """The primitives as functions that a language model can call, each with a JSON schema of its arguments.
 
     Args:
       tables: of a scene whose names of objects and rooms are listed as the only values; None: any text.
+      substances: that are in use in it (`Scene.substances`), listed likewise; None: any text.
     """
     found = []
     for primitive in PRIMITIVES.values():
-        properties = {name: _argument(name, tables) for name in primitive.arguments}
+        properties = {name: _argument(name, tables, substances) for name in primitive.arguments}
         found.append(
             {
                 "type": "function",
@@ -50,10 +51,13 @@ def tools(tables: SceneTables | None = None) -> list[dict[str, Any]]:
     return found
 
 
-def _argument(name: str, tables: SceneTables | None) -> dict[str, Any]:
+def _argument(name: str, tables: SceneTables | None, substances: Sequence[str] | None) -> dict[str, Any]:
     if name == "room":
         schema: dict[str, Any] = {"type": "string", "description": "name of a room of the scene"}
         names = None if tables is None else list(tables.room_names)
+    elif name == SUBSTANCE:
+        schema = {"type": "string", "description": "name of a substance that is in use in the scene"}
+        names = None if substances is None else list(substances)
     else:
         schema = {"type": "string", "description": f"name of an object of the scene: the {name}"}
         names = None if tables is None else list(tables.object_names)

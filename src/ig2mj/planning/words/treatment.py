@@ -1,10 +1,11 @@
-"""Which primitive and which tool treat an object that an instruction says to clean, cook or slice."""
+"""Which primitive and which tool treat an object that an instruction says to clean, cook, slice or pour onto."""
 
 from __future__ import annotations
 
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.steps import Step, make_step
+from ig2mj.planning.supplies import held_substances
 from ig2mj.planning.words.nouns import NotUnderstoodError
 
 
@@ -38,6 +39,30 @@ def treatment(facts: Facts, kind: str, name: str, tool: str) -> Step:
     if not able:
         raise NotUnderstoodError(f"nothing here can {kind} {name}")
     return make_step(kind, (name, tool or able[0]))
+
+
+def pouring(facts: Facts, source: str, target: str, substance: str) -> Step:
+    """The step that pours.
+
+    Args:
+      source: container; "": the first that can be carried and holds the substance. substance: "": what there is most of
+        in the container.
+
+    Raises:
+      NotUnderstoodError: no container holds it, or it cannot be poured there.
+    """
+    domain = facts.domain
+    if source and not substance:
+        substance = next(iter(held_substances(facts, source)), "")
+    full = [n for n in domain.pourable if n != target and substance in held_substances(facts, n)]
+    if not substance or (source and source not in full) or not full:
+        what = substance or "anything that flows"
+        said = f"{source} does not contain {what}" if source else f"no container that can be carried contains {what}"
+        raise NotUnderstoodError(said)
+    step = domain.meant(make_step("pour", (source or full[0], target, substance)))
+    if reason := domain.impossible(step.adds[0]):
+        raise NotUnderstoodError(f"cannot pour {substance} there: {reason}")
+    return step
 
 
 def _cleaning(facts: Facts, kind: str, name: str) -> str:

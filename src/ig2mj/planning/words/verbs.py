@@ -21,6 +21,7 @@ _WORDS = {
     "clean": "clean|clean up",
     "soak": "soak|wet|rinse|moisten|dampen",
     "fill": "fill|fill up",
+    "pour": "pour|pour out|tip|spill",
     "slice": "slice|cut|cut up|chop|chop up|halve",
     "cook": "cook|fry|bake|roast|boil|grill",
     "freeze": "freeze",

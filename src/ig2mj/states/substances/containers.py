@@ -116,6 +116,16 @@ class Containers:
             parts.append(low + (tilt - row) * (high - low))
         return parts[0] + (turn - column) * (parts[1] - parts[0])
 
+    def stays_in(self, row: int, up: Float[np.ndarray, "3"]) -> float:
+        """Litres that stay in one container. `up`: the direction upwards in the frame of its body."""
+        x, y = up @ self.side[row], up @ self.across[row]
+        tilt = float(np.arctan2(np.hypot(x, y), up @ self.normal[row])) * ((TILTS - 1) / np.pi)
+        turn = float(np.arctan2(y, x)) * (DIRECTIONS / (2 * np.pi)) % DIRECTIONS
+        low, part = min(int(tilt), TILTS - 2), int(turn) % DIRECTIONS
+        rows = self.capacity[row, low : low + 2][:, [part, (part + 1) % DIRECTIONS]]
+        rows = rows[0] + (tilt - low) * (rows[1] - rows[0])
+        return float(rows[0] + (turn - int(turn)) * (rows[1] - rows[0]))
+
     def openings(self, view: PhysicsView) -> Openings:
         """Where the openings are."""
         frames = self.frames(view)

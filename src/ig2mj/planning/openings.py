@@ -1,0 +1,67 @@
+"""Where substances enter and leave objects, as a robot sees it: openings of containers, and points of surfaces.
+
+Axes: R corners of a rim, N points of a surface.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.planning.clearance import straight
+from ig2mj.planning.world import PlannedWorld, Vector
+from ig2mj.states.substances.model import of
+
+FREE = (0.03, 0.2)
+"""m above a point of a surface between which a stream must not meet anything else."""
+
+THICK = 0.005
+"""m, radius of a stream there."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Opening:
+    """Of a container, world frame: middle (m), unit normal that points out, and corners (m)."""
+
+    centre: Vector
+    normal: Vector
+    rim: Float[np.ndarray, "R 3"]
+
+
+def opening_of(world: PlannedWorld, name: str) -> Opening:
+    """The opening of a container."""
+    containers = of(world.domain.model).containers
+    row = containers.row_of(world.index(name))
+    assert row is not None, name
+    body = int(containers.body[row])
+    turn = matrices_on_host(np.asarray(world.view.body_quat)[world.world, body][None])[0]
+    pos = np.asarray(world.view.body_pos)[world.world, body].astype(float)
+    return Opening(
+        turn @ containers.centre[row] + pos, turn @ containers.normal[row], containers.rim[row] @ turn.T + pos
+    )
+
+
+def free_points(world: PlannedWorld, name: str, least: float) -> Float[np.ndarray, "N 3"]:
+    """Points of an object's surface that substances can cover and that lie open above, m, world frame; the nearest to
+    the robot first.
+
+    Args:
+      least: z of the normal of a point, at least.
+    """
+    found, number = of(world.domain.model), world.world
+    row = int(found.row[world.index(name)])
+    if row == len(found.covered):
+        return np.zeros((0, 3))
+    body = found.body[row]
+    turn = matrices_on_host(np.asarray(world.view.body_quat)[number, body])
+    points = np.einsum("nij,nj->ni", turn, found.pos[row]) + np.asarray(world.view.body_pos)[number, body]
+    up = np.einsum("nij,nj->ni", turn, found.normal[row])[:, 2] >= least
+    obstacles = world.obstacles([name, *(n for n in world.held if n)])
+    stream = np.array([[0.0, 0.0, 0.0, THICK]])
+    low, high = (above * np.array([0.0, 0.0, 1.0]) for above in FREE)
+    free = [p for p in points[up].astype(float) if straight(obstacles, stream, p + low, p + high)]
+    here, _ = world.base
+    return np.array(sorted(free, key=lambda p: float(np.linalg.norm(p[:2] - here)))).reshape(-1, 3)
