@@ -101,13 +101,6 @@ _PRIMITIVES = (
         "fill", ("object", "source"), "the object, a container, is in a hand; the water runs", "filled(object, water)",
         (("filled", "?0", "water"),),
     ),
-    Primitive(
-        "pour", ("object", "target", "substance"), "the object, which contains the substance, is in a hand",
-        "contains(target, substance); of what absorbs, saturated; of anything else, covered",
-        one_of=(
-            ("contains", "?1", "?2"), ("filled", "?1", "?2"), ("saturated", "?1", "?2"), ("covered", "?1", "?2"),
-        ),
-    ),
     Primitive("slice", ("object", "knife"), "the knife is in a hand", "sliced(object)", (("sliced", "?0"),)),
     Primitive(
         "cook", ("object", "source"), "the source is on; the object is in a hand, or inside a source that acts inside",
@@ -120,6 +113,13 @@ _PRIMITIVES = (
     Primitive(
         "push", ("object", "other"), "a free hand", "in_contact_with(object, other)",
         (("in_contact_with", "?0", "?1"),),
+    ),
+    Primitive(
+        "pour", ("object", "target", "substance"), "the object, which contains the substance, is in a hand",
+        "contains(target, substance); of what absorbs, saturated; of anything else, covered",
+        one_of=(
+            ("contains", "?1", "?2"), ("filled", "?1", "?2"), ("saturated", "?1", "?2"), ("covered", "?1", "?2"),
+        ),
     ),
 )  # fmt: skip
 
