@@ -4,7 +4,8 @@ A step of MuJoCo, or its cameras, is one call that JAX makes from within a compi
 graph, which takes 65 ms for a step of a home, and replays that graph whenever all arrays of the call are at the
 addresses of the capture. Arrays without elements count, too, and XLA gives them another address in most calls. A step
 has dozens of them (of flexes, tendons and sensors that a scene does not have), so that captures may never end where an
-iteration of a training is two programs. Here only arrays with elements count.
+iteration of a training is two programs. Here only arrays with elements count, and those of one element do not move
+(`ig2mj.engine.warp.patches.counters`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 
 import warp as wp
 
+from ig2mj.engine.warp.patches import counters
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.patches.table import runs
 
@@ -40,6 +42,7 @@ class Filled:
         """Traces a call. An array that has elements in any call traced so far counts in all of them."""
         with self._lock:
             self._seen.update(k for k in self._indices if args[k].size)
+            counters.note(self._call, {k: args[k] for k in self._indices})
             self._call.array_input_indices = [k for k in self._indices if k in self._seen]
             self._kinds.add(tuple(args[k].shape for k in self._indices))
             self._call.graph_cache_max = GRAPHS * len(self._kinds)
@@ -61,5 +64,5 @@ def graphs_kept() -> Iterator[None]:
     MJX registers a function once. Its cameras are the same functions for all users in the process: whether they find
     graphs in this way is decided by the first user.
     """
-    with _callables.entered(runs("graphs")):
+    with _callables.entered(runs("graphs")), counters.counters_in_place(runs("graphs")):
         yield

@@ -44,7 +44,7 @@ GROUPS = {
     ),
     "pair_overflow": Group("too many pairs in the first collision pass are flagged", ("collision",), True),
     "contacts": Group("stray contacts are dropped, slanted normals on faces corrected", ("contacts",), True),
-    "graphs": Group("empty arrays do not decide which CUDA graph is replayed", ("graphs",), True),
+    "graphs": Group("empty and moving arrays do not decide which CUDA graph is replayed", ("graphs", "counters"), True),
     "gravity": Group("gravity compensation per (world, body), not per degree of freedom", ("gravity",)),
     "velocity": Group("the velocity stage runs once a step, not twice", ("velocity",)),
     "skipped_stages": Group("island numbering and a second list of awake dofs are skipped", ("skipped_stages",)),
