@@ -19,6 +19,7 @@ from ig2mj.predicates.substances import substance_index
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.rules import PLACEMENTS
 from ig2mj.states.model import StateModel
+from ig2mj.states.substances.applying import sprays
 from ig2mj.states.substances.model import ALWAYS
 
 SUPPORT_HEIGHT, SUPPORT_EDGE = (0.25, 1.3), 0.3
@@ -167,8 +168,12 @@ class Domain:
 
     @functools.cached_property
     def sprays(self) -> tuple[str, ...]:
-        """Containers that spray what they hold, and can be carried."""
-        return ()
+        """Containers that spray what they hold, and can be carried; one hand holds them, another one switches them."""
+        found = self.model.substances
+        if found is None or self.hands < 2:
+            return ()
+        names = {self.model.tables.object_names[found.containers.object[row]] for row in sprays(self.model)}
+        return tuple(n for n in self.pourable if n in names)
 
     def litres(self, name: str) -> float:
         """Litres that a container holds; of anything else, 0."""

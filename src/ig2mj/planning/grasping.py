@@ -38,6 +38,8 @@ from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.taking import closing_on, entries, way_to
 from ig2mj.planning.two_hands import grasp_with_both, holds_with_both, release_with_both
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
+from ig2mj.scene.tables import LinkKind
+from ig2mj.states.definitions.toggled_on import BUTTON_DISTANCE
 
 LIFT = 0.03
 """m that an object is lifted before it is drawn sideways."""
@@ -74,7 +76,8 @@ NEAREST = 200
 
 def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Primitive:
     """The hand goes onto a side of the object that has room for it, until it holds it; of sides that `prefers` finds
-    better by at least `CLEARLY`, these first; None: those that leave the side of a tool free that cleans.
+    better by at least `CLEARLY`, these first; None: those that leave the side of a tool free that cleans, or the
+    button of a spray.
     """
     name = step.object
     if world.domain.hands_for(name) > 1:
@@ -91,6 +94,8 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         hand = free_hand(world, attempt)
         if prefers is None and name in world.domain.tools and world.body.opening is None:
             prefers = functools.partial(_leaves_free, world, name)
+        elif prefers is None and name in world.domain.sprays:
+            prefers = functools.partial(_off_button, world, name)
         found = _plan(world, name, hand, tried, prefers)
         while found is None and (yield from open_around(world, name, moved)):
             found = _plan(world, name, hand, tried, prefers)
@@ -118,6 +123,25 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
 
 def _leaves_free(world: PlannedWorld, name: str, pose: GraspPose) -> float:
     return float(leaves_free(world, name, pose))
+
+
+def _off_button(world: PlannedWorld, name: str, pose: GraspPose) -> float:
+    """How far the fingers of a hand at a pose are from the button of what it takes; 1: they do not press it."""
+    button = button_of(world, name)
+    if button is None:
+        return 1.0
+    return min(float(np.linalg.norm(pose.point + FINGER * pose.fingers - button)) / (BUTTON_DISTANCE + SPARE), 1.0)
+
+
+FINGER, SPARE = 0.06, 0.05
+"""m from a grasp point to the fingers' frames, and by which they stay farther from a button than would press it."""
+
+
+def button_of(world: PlannedWorld, name: str) -> Vector | None:
+    """Where the button of an object is, m, world frame; None: it has none."""
+    tables = world.domain.model.tables
+    links = np.flatnonzero((tables.link_object == world.index(name)) & (tables.link_kind == LinkKind.TOGGLE_BUTTON))
+    return np.asarray(world.view.link_pos)[world.world, links[0]].astype(float) if len(links) else None
 
 
 def is_graspable(world: PlannedWorld, name: str) -> bool:

@@ -39,6 +39,7 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
         "soak": [n for n in loose if domain.has(n, "soakable")],
         "fill": [n for n in loose if n in domain.fillable],
         "pour": list(domain.pourable),
+        "spray": [n for n in problem.named if n in things and n not in domain.sprays],
         "slice": [n for n in things if domain.has(n, "sliceable")],
         "cook": [n for n in loose if domain.has(n, "cookable")],
         "freeze": [n for n in loose if domain.has(n, "freezable")],
@@ -51,6 +52,7 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
         "fill": domain.taps,
         "slice": domain.knives,
         "pour": [n for n in problem.named if n in things],
+        "spray": domain.sprays,
     }
     substances = _substances(domain, problem)
     for primitive, kind in PRIMITIVES.items():

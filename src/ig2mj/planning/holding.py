@@ -60,13 +60,17 @@ class Hold:
 
 
 def hold_at(
-    world: PlannedWorld, name: str, hand: int, holds: Callable[[], Sequence[Hold]]
+    world: PlannedWorld,
+    name: str,
+    hand: int,
+    holds: Callable[[], Sequence[Hold]],
+    suits: Callable[[Stance, Hold], bool] = lambda stance, hold: True,
 ) -> Generator[Program, str, tuple[str, list[Vector], int]]:
     """Holds an object in the first of some ways that the hand has a way to, with the robot standing anywhere; returns
     the reason why it did not, the way, and the number of the hold.
 
     Args:
-      holds: as the object is held now.
+      holds: as the object is held now. suits: whether a hold is right where the robot stands.
     """
     missed = set[tuple[tuple[float, float], int]]()
     for _ in range(ATTEMPTS):
@@ -77,10 +81,10 @@ def hold_at(
                 held = about_vertical(-now) @ hold.offset
                 here = world.stance  # a base on wheels that stands near enough stays there
                 near = not world.body.sideways and world.reaches(hand, here, hold.point + hold.offset)
-                if near and (here.xy, hold.number) not in missed:
+                if near and (here.xy, hold.number) not in missed and suits(here, hold):
                     yield here, hold
                 for stance in stances(world, hand, hold.point, floor, AWAY, STANCES, held):
-                    if (stance.xy, hold.number) not in missed:
+                    if (stance.xy, hold.number) not in missed and suits(stance, hold):
                         yield stance, hold
 
         def aim(stance: Stance, hold: Hold, now=now) -> tuple[Vector, Rotation]:

@@ -1,6 +1,6 @@
 """Where substances enter and leave objects, as a robot sees it: openings of containers, and points of surfaces.
 
-Axes: R corners of a rim, N points of a surface.
+Axes: R corners of a rim, D objects that can be covered, N points of a surface.
 """
 
 from __future__ import annotations
@@ -44,6 +44,22 @@ def opening_of(world: PlannedWorld, name: str) -> Opening:
     )
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Surfaces:
+    """The points of all objects that substances can cover, world frame: where they are (m), and unit normals."""
+
+    points: Float[np.ndarray, "D N 3"]
+    normals: Float[np.ndarray, "D N 3"]
+
+
+def surfaces(world: PlannedWorld) -> Surfaces:
+    """Where the points of all objects are now."""
+    found, number = of(world.domain.model), world.world
+    turn = matrices_on_host(np.asarray(world.view.body_quat)[number])[found.body]
+    pos = np.asarray(world.view.body_pos)[number].astype(float)[found.body]
+    return Surfaces(np.einsum("dnij,dnj->dni", turn, found.pos) + pos, np.einsum("dnij,dnj->dni", turn, found.normal))
+
+
 def free_points(world: PlannedWorld, name: str, least: float) -> Float[np.ndarray, "N 3"]:
     """Points of an object's surface that substances can cover and that lie open above, m, world frame; the nearest to
     the robot first.
@@ -51,17 +67,14 @@ def free_points(world: PlannedWorld, name: str, least: float) -> Float[np.ndarra
     Args:
       least: z of the normal of a point, at least.
     """
-    found, number = of(world.domain.model), world.world
-    row = int(found.row[world.index(name)])
-    if row == len(found.covered):
+    row = int(of(world.domain.model).row[world.index(name)])
+    all_points = surfaces(world)
+    if row == len(all_points.points):
         return np.zeros((0, 3))
-    body = found.body[row]
-    turn = matrices_on_host(np.asarray(world.view.body_quat)[number, body])
-    points = np.einsum("nij,nj->ni", turn, found.pos[row]) + np.asarray(world.view.body_pos)[number, body]
-    up = np.einsum("nij,nj->ni", turn, found.normal[row])[:, 2] >= least
+    points = all_points.points[row][all_points.normals[row, :, 2] >= least]
     obstacles = world.obstacles([name, *(n for n in world.held if n)])
     stream = np.array([[0.0, 0.0, 0.0, THICK]])
     low, high = (above * np.array([0.0, 0.0, 1.0]) for above in FREE)
-    free = [p for p in points[up].astype(float) if straight(obstacles, stream, p + low, p + high)]
+    free = [p for p in points if straight(obstacles, stream, p + low, p + high)]
     here, _ = world.base
     return np.array(sorted(free, key=lambda p: float(np.linalg.norm(p[:2] - here)))).reshape(-1, 3)

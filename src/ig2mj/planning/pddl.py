@@ -31,6 +31,7 @@ DOMAIN = """\
     (sliced ?o - thing) (cooked ?o - thing) (frozen ?o - thing)
     (filled ?o - thing ?l - substance) (contains ?o - thing ?l - substance) (container ?o - thing)
     (covered ?o - thing ?l - substance) (saturated ?o - thing ?l - substance) (absorbs ?o - thing)
+    (sprays ?o - thing)
     (openable ?o - thing) (switched ?o - thing) (tool ?o - thing) (knife ?o - thing) (tap ?o - thing)
     (heats ?s ?o - thing) (cools ?s ?o - thing) (acts_inside ?s - thing) (needs_switch ?s - thing)
     (needs_closed ?s - thing))
@@ -78,6 +79,9 @@ DOMAIN = """\
     :effect (and (when (container ?t) (and (filled ?t ?l) (contains ?t ?l)))
       (when (and (absorbs ?t) (not (container ?t))) (saturated ?t ?l))
       (when (and (not (absorbs ?t)) (not (container ?t))) (covered ?t ?l))))
+  (:action spray :parameters (?o ?s - thing ?l - substance ?h - hand)
+    :precondition (and (held ?s) (sprays ?s) (contains ?s ?l) (free ?h))
+    :effect (and (when (absorbs ?o) (saturated ?o ?l)) (when (not (absorbs ?o)) (covered ?o ?l))))
   (:action scrub :parameters (?o ?t - thing)
     :precondition (and (tool ?t) (held ?t) (soaked ?t))
     :effect (not (stained ?o)))
@@ -141,6 +145,7 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
         lines += [f"({word} {n})" for n in things if domain.has(n, ability)]
     lines += [f"(tap {n})" for n in things if n in domain.taps]
     lines += [f"(container {n})" for n in things if domain.contains(n)]
+    lines += [f"(sprays {n})" for n in things if n in domain.sprays]
     lines += [f"(absorbs {n})" for n in things if domain.absorbs(n)]
     for source in (s for s in domain.sources if s.name in things):
         lines += [f"(heats {source.name} {n})" for n in things if source in domain.heaters(n)]

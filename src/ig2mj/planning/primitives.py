@@ -20,6 +20,7 @@ from ig2mj.planning.opening import set_open
 from ig2mj.planning.placing import bring_out, place
 from ig2mj.planning.pouring import pour
 from ig2mj.planning.pushing import push
+from ig2mj.planning.spraying import spray
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
@@ -94,5 +95,6 @@ ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {
     "cook": cook,
     "freeze": freeze,
     "push": push,
+    "spray": spray,
 }
 """Primitives that are carried out in physics."""

@@ -83,7 +83,8 @@ class RequestSource:
         domain = self._domain
         able = {"open": domain.openable, "close": domain.openable}
         able |= dict.fromkeys(("toggle_on", "toggle_off"), self._with("toggleable"))
-        able |= {"wipe": self._with("dustyable"), "scrub": self._with("stainable"), "navigate_to": self._things}
+        able |= {"wipe": self._with("dustyable"), "scrub": self._with("stainable")}
+        able |= dict.fromkeys(("navigate_to", "spray"), self._things)
         first = {
             "soak": [n for n in self._loose if domain.has(n, "soakable")] + [self._rag],
             "fill": [n for n in self._loose if n in domain.fillable],
@@ -107,6 +108,7 @@ class RequestSource:
             "soak": domain.taps,
             "fill": domain.taps,
             "pour": self._things,
+            "spray": domain.sprays,
         }
         if primitive in ("cook", "freeze"):
             sources = domain.heaters(name) if primitive == "cook" else domain.coolers(name)
@@ -146,8 +148,9 @@ class RequestSource:
             return [], (second,)
         if primitive in ("soak", "fill"):
             return self._running(second), (name,)
-        if primitive == "pour":
-            return [true("filled", name, WATER)], (name,)
+        if primitive in ("pour", "spray"):
+            container = name if primitive == "pour" else arguments[1]
+            return [true("filled", container, WATER)], (container,)
         if primitive in ("cook", "freeze"):
             source = next(s for s in self._domain.sources if s.name == second)
             before = self._running(second) if source.needs_switch else []

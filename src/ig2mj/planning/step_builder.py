@@ -19,7 +19,7 @@ from ig2mj.planning.steps import PLACE, Step
 from ig2mj.planning.supplies import RECEIVED, Supply, supplies
 from ig2mj.sampling.conditions import Condition
 
-SUPPLIES = ("fill", "soak", "pour")
+SUPPLIES = ("fill", "soak", "pour", "spray")
 """Primitives that bring a substance into or onto an object."""
 
 CLEARED = 2
@@ -255,7 +255,11 @@ class StepBuilder:
             near = min(self._domain.supports, key=self._far_from(name), default="")
             self._put(*(("place_on_top", name, near) if near else ("place_on_floor", name, self._facts.room(name))))
         self._take(chosen.source)
-        self._add("pour", chosen.source, name, substance, also=(c,))
+        if chosen.primitive == "pour":
+            self._add("pour", chosen.source, name, substance, also=(c,))
+        else:
+            self._free_hand(chosen.source)
+            self._add("spray", name, chosen.source, substance, also=(c,))
 
     def _far_from(self, name: str) -> Callable[[str], float]:
         return lambda other: float(np.linalg.norm(self._facts.place(other) - self._facts.place(name)))

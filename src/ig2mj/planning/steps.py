@@ -121,6 +121,12 @@ _PRIMITIVES = (
             ("contains", "?1", "?2"), ("filled", "?1", "?2"), ("saturated", "?1", "?2"), ("covered", "?1", "?2"),
         ),
     ),
+    Primitive(
+        "spray", ("object", "spray", "substance"),
+        "the spray, which contains the substance, is in a hand; another hand is free",
+        "covered(object, substance); of what absorbs, saturated",
+        one_of=(("covered", "?0", "?2"), ("saturated", "?0", "?2")),
+    ),
 )  # fmt: skip
 
 SUBSTANCE = "substance"

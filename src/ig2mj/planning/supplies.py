@@ -117,8 +117,9 @@ def _steps(facts: Facts, name: str, supply: Supply) -> int:
     moved = name if supply.primitive in ("fill", "soak") else supply.source
     tap = supply.tap or (supply.source if supply.primitive in ("fill", "soak") else "")
     runs = not tap or not facts.domain.has(tap, "toggleable") or facts.holds("toggled_on", tap)
-    shut = 0 if moved in facts.held else 1 + sum(not facts.holds("open", c) for c in facts.containers(moved))
-    return 1 + shut + (not runs) + bool(supply.tap)
+    around = {c for n in (name, moved) if n not in facts.held for c in facts.containers(n)}
+    shut = sum(not facts.holds("open", c) for c in around)
+    return 1 + (moved not in facts.held) + shut + (not runs) + bool(supply.tap)
 
 
 def lacking(facts: Facts, condition: Condition) -> str:

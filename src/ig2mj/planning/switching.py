@@ -5,10 +5,9 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterator
 
-import numpy as np
-
 from ig2mj.planning.clearance import straight
 from ig2mj.planning.driving import go
+from ig2mj.planning.grasping import FINGER, button_of
 from ig2mj.planning.moves import (
     ATTEMPTS,
     DOWN,
@@ -27,10 +26,9 @@ from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
-from ig2mj.scene.tables import LinkKind
 
-FINGER, NEAR_BUTTON = 0.06, 0.13
-"""m from a grasp point to the fingers' frames, and before a button at which a hand comes to it."""
+NEAR_BUTTON = 0.13
+"""m before a button at which a hand comes to it."""
 
 PRESSING = 0.07
 """m from a button within which a finger holds it down for sure, whatever is in the way of coming nearer."""
@@ -47,14 +45,13 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
 
     def toggle(world: PlannedWorld, step: Step) -> Primitive:
         name, reason, detail = step.object, "no_base", ""
-        tables = world.domain.model.tables
-        links = np.flatnonzero((tables.link_object == world.index(name)) & (tables.link_kind == LinkKind.TOGGLE_BUTTON))
-        if not len(links):
+        if button_of(world, name) is None:
             return Outcome("no_grasp", f"{name} has no button")
         for attempt in range(ATTEMPTS):
             if world.facts.holds("toggled_on", name) == value:
                 return Outcome(attempts=max(attempt, 1))
-            button = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
+            button = button_of(world, name)
+            assert button is not None
             hand = free_hand(world, attempt)
             found = _plan(world, button, hand, attempt, world.stance if name in world.held else None)
             if found is None:

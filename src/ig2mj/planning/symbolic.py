@@ -152,11 +152,11 @@ class SymbolicRung:
                 return f"both hands are needed for {name}, and they hold {', '.join(held)}"
             if self._domain.fixed(name):
                 return f"{name} is fixed"
-        if kind in ("open", "close", "push") and self._domain.hands_taken(held) >= self._domain.hands:
+        if kind in ("open", "close", "push", "spray") and self._domain.hands_taken(held) >= self._domain.hands:
             return f"the hands are full: {', '.join(held)}"
         if (kind.startswith("place_") or kind in ("release", "soak", "fill", "pour")) and name not in held:
             return f"no hand holds {name}"
-        if kind in ("wipe", "scrub", "slice") and second not in held:
+        if kind in ("wipe", "scrub", "slice", "spray") and second not in held:
             return f"no hand holds {second}"
         if kind == "scrub" and not facts.holds("soaked", second):
             return f"{second} is not soaked"
@@ -235,7 +235,10 @@ class SymbolicRung:
         return None
 
 
-BRINGS: dict[str, Callable[[Step], str]] = {"pour": lambda step: step.arguments[0]}
+BRINGS: dict[str, Callable[[Step], str]] = {
+    "pour": lambda step: step.arguments[0],
+    "spray": lambda step: step.arguments[1],
+}
 """Primitives that bring a substance somewhere -> what holds it."""
 
 

@@ -11,7 +11,7 @@ from ig2mj.planning.facts import Facts
 from ig2mj.planning.steps import PRIMITIVES, Step, make_step
 from ig2mj.planning.words.instruction import Instruction
 from ig2mj.planning.words.nouns import Lexicon, NotUnderstoodError, Phrase, Reader, choose
-from ig2mj.planning.words.treatment import pouring, treatment
+from ig2mj.planning.words.treatment import bringing, treatment
 from ig2mj.planning.words.verbs import (
     ADJECTIVES,
     CARRY,
@@ -37,6 +37,9 @@ PLACES = {
     "under": "place_under",
     "in_contact_with": "push",
 }
+
+ONTO = ("into", "inside", "in", "onto", "on top of", "on", "over", "to")
+"""Prepositions of where something is poured."""
 
 _TOKEN = re.compile(r"[\w'-]+|[.,;:!?]")
 _ENDS = frozenset(".;:!?")
@@ -133,6 +136,8 @@ class _Clauses:
             self._each("navigate_to", self._objects())
         elif kind == "pour":
             self._pour()
+        elif kind == "spray":
+            self._spray()
         else:
             self._treat(kind)
 
@@ -267,21 +272,36 @@ class _Clauses:
         elif reader.take(*FROM):
             (source,) = self._names(self._objects("a container", single=True), "held")[:1]
         self._fillers()
-        if not reader.take("into", "in", "inside", "onto", "on top of", "on", "over", "to"):
+        if not reader.take(*ONTO):
             raise self._unknown("'into' or 'over'")
         (target,) = self._target(moved=[source])
-        self.steps.append(pouring(facts, source, target, substance))
+        self.steps.append(bringing(facts, "pour", source, target, substance))
         self.mentioned.append(Phrase("it", (target,), 0))
 
-    def _substance(self) -> str:
-        """A substance in use that is named here and followed by where it goes or comes from, which is passed; "":
-        none."""
+    def _spray(self) -> None:
+        """ "the plant with water", "water onto the plant", "the plant with the atomizer"."""
+        reader, spray = self.reader, ""
+        if substance := self._substance():
+            reader.take(*ONTO)
+            targets = self._names(self._objects())
+        else:
+            targets = self._names(self._objects())
+            if reader.take("with") and not (substance := self._substance(last=True)):
+                (spray,) = self._names(self._objects("a spray or a substance", single=True), "held")[:1]
+        self.steps.extend(bringing(self.lexicon.facts, "spray", spray, target, substance) for target in targets)
+
+    def _substance(self, last: bool = False) -> str:
+        """A substance in use that is named here, which is passed; "": none.
+
+        Args:
+          last: nothing need follow; else where it goes or comes from.
+        """
         reader, began = self.reader, self.reader.at
         used = self.domain.model.substances
         reader.take("the", "some", "a bit of", "some of the", "all of the", "all the")
         for name in sorted(() if used is None else used.names, key=len, reverse=True):
             if reader.take(name.replace("_", " ").replace("  ", " ")):
-                if any(reader.sees(text) for text in (*FROM, "into", "in", "inside", "onto", "on", "over", "to")):
+                if last or any(map(reader.sees, (*FROM, *ONTO))):
                     return name
                 break
         reader.at = began

@@ -1,4 +1,4 @@
-"""Which primitive and which tool treat an object that an instruction says to clean, cook, slice or pour onto."""
+"""Which primitive and which tool treat an object that an instruction says to clean, cook or slice, or to pour onto."""
 
 from __future__ import annotations
 
@@ -41,27 +41,30 @@ def treatment(facts: Facts, kind: str, name: str, tool: str) -> Step:
     return make_step(kind, (name, tool or able[0]))
 
 
-def pouring(facts: Facts, source: str, target: str, substance: str) -> Step:
-    """The step that pours.
+def bringing(facts: Facts, kind: str, source: str, target: str, substance: str) -> Step:
+    """The step that pours or sprays.
 
     Args:
-      source: container; "": the first that can be carried and holds the substance. substance: "": what there is most of
-        in the container.
+      kind: pour or spray. source: what holds the substance; "": the first that can be carried. substance: "": what
+        there is most of.
 
     Raises:
-      NotUnderstoodError: no container holds it, or it cannot be poured there.
+      NotUnderstoodError: nothing holds it, or it cannot be brought there.
     """
     domain = facts.domain
-    if source and not substance:
-        substance = next(iter(held_substances(facts, source)), "")
-    full = [n for n in domain.pourable if n != target and substance in held_substances(facts, n)]
-    if not substance or (source and source not in full) or not full:
+    usable = [n for n in (domain.sprays if kind == "spray" else domain.pourable) if n != target]
+    if not substance:
+        held = (held_substances(facts, n) for n in ([source] if source else usable))
+        substance = next((found[0] for found in held if found), "")
+    full = [n for n in usable if substance in held_substances(facts, n)]
+    if not substance or not full or (source and source not in full):
         what = substance or "anything that flows"
-        said = f"{source} does not contain {what}" if source else f"no container that can be carried contains {what}"
-        raise NotUnderstoodError(said)
-    step = domain.meant(make_step("pour", (source or full[0], target, substance)))
+        none = f"no {'spray' if kind == 'spray' else 'container'} that can be carried contains {what}"
+        raise NotUnderstoodError(f"{source} does not contain {what}" if source in usable else none)
+    first = source or full[0]
+    step = domain.meant(make_step(kind, (first, target, substance) if kind == "pour" else (target, first, substance)))
     if reason := domain.impossible(step.adds[0]):
-        raise NotUnderstoodError(f"cannot pour {substance} there: {reason}")
+        raise NotUnderstoodError(f"cannot {kind} {target}: {reason}")
     return step
 
 

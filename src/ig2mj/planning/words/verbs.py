@@ -22,6 +22,7 @@ _WORDS = {
     "soak": "soak|wet|rinse|moisten|dampen",
     "fill": "fill|fill up",
     "pour": "pour|pour out|tip|spill",
+    "spray": "spray|mist",
     "slice": "slice|cut|cut up|chop|chop up|halve",
     "cook": "cook|fry|bake|roast|boil|grill",
     "freeze": "freeze",

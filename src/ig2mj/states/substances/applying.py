@@ -24,7 +24,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.geometry.frames import Frames, numbers, some
-from ig2mj.geometry.poses import quat_rotate
+from ig2mj.geometry.poses import AnyArray, namespace, quat_rotate
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep
 from ig2mj.states.substances import coat
@@ -212,18 +212,36 @@ def _brushed(step: EventStep, brush: int, loaded: Bool[Array, "W U"]) -> EventSt
     return _absorbed(step.having(coat=before | new), np.array([brush]), -drops[:, None])
 
 
+def in_cone(
+    positions: Float[AnyArray, "*b D N 3"],
+    normals: Float[AnyArray, "*b D N 3"],
+    nozzle: Float[AnyArray, "*#b 1 1 3"],
+    ahead: Float[AnyArray, "*#b 1 1 3"],
+    others: Bool[np.ndarray, "D"],
+) -> tuple[Bool[AnyArray, "*b D N"], Float[AnyArray, "*b D N"]]:
+    """Which points of surfaces are in the cone of a spray and face it, and how far along its axis they are, m; of NumPy
+    arrays NumPy arrays.
+
+    Args:
+      nozzle: m. ahead: unit, of its axis. others: objects that are not the spray itself.
+    """
+    xp = namespace(positions)
+    offset = positions - nozzle
+    along = xp.sum(offset * ahead, axis=-1)
+    aside = xp.sqrt(xp.maximum(xp.sum(offset * offset, axis=-1) - along * along, 0.0))
+    faces = xp.sum(normals * offset, axis=-1) < 0.0
+    return (along > 0.0) & (along <= REACH) & (aside <= SLOPE * along) & faces & others[:, None], along
+
+
 def _sprayed(step: EventStep, row: int, litres: Float[Array, "W U"], given: Float[Array, "W U"]) -> EventStep:
     model, states, found, view = step.model, step.states, of(step.model), step.view
     body, spray = found.containers.body[row], int(found.containers.object[row])
     at, quat = jnp.asarray(view.body_pos)[:, body], jnp.asarray(view.body_quat)[:, body]
     nozzle = at + quat_rotate(quat, found.containers.centre[row])
     ahead = quat_rotate(quat, np.array([1.0, 0.0, 0.0], np.float32))[:, None, None]
-    offset = coat.positions(model, view) - nozzle[:, None, None]
-    along = jnp.sum(offset * ahead, axis=-1)
-    aside = jnp.sqrt(jnp.maximum(jnp.sum(offset * offset, axis=-1) - along * along, 0.0))
-    faces = jnp.sum(coat.normals(model, view) * offset, axis=-1) < 0.0
-    others = (found.covered != spray)[:, None]
-    inside = (along > 0.0) & (along <= REACH) & (aside <= SLOPE * along) & faces & others  # [W, D, N]
+    inside, along = in_cone(
+        coat.positions(model, view), coat.normals(model, view), nozzle[:, None, None], ahead, found.covered != spray
+    )
     depth = jnp.where(inside, along, jnp.inf)
     least = jnp.min(depth, axis=-1)
     met = jnp.argmin(least, axis=-1)  # [W]
