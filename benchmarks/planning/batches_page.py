@@ -7,7 +7,8 @@
     python -m benchmarks.planning.batches_page                     writes the page from what was taken in before
 
 What is taken in is a line in benchmarks/results/planning/batched.jsonl for each activity, engine and number of worlds,
-and in policies.jsonl for each activity and algorithm.
+and in policies.jsonl for each activity and algorithm. What is written by hand stands in the page's last section,
+`OWN`, and stays.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ from benchmarks.planning.page import read_lines, table
 FOLDER = RESULTS / "planning"
 PAGE = ROOT / "docs" / "notes" / "planner.md"
 BATCHED, POLICIES = "batched.jsonl", "policies.jsonl"
+OWN = "## Noted"
+"""Heading of the section that stays as it is."""
+
 POINTS = 8
 """Points of a curve that are kept, at most."""
 
@@ -48,8 +52,15 @@ def main() -> None:
     found += [row for file in args.learned for row in read_lines(file)]
     take_in(found, args.results / POLICIES, lambda row: (row["activity"], row["algorithm"]))
     kept = read_lines(args.results / BATCHED), read_lines(args.results / POLICIES)
-    args.page.write_text(page(*kept), encoding="utf-8")
+    before = args.page.read_text(encoding="utf-8") if args.page.exists() else ""
+    args.page.write_text(page(*kept) + own_section(before), encoding="utf-8")
     print(args.page)
+
+
+def own_section(text: str) -> str:
+    """What of a page is written by hand, with the line before it; "" where there is none."""
+    _, heading, own = text.partition(f"\n{OWN}\n")
+    return heading + own
 
 
 def take_in(rows: Sequence[Row], file: pathlib.Path, key: Callable[[Row], tuple]) -> None:
@@ -121,8 +132,8 @@ def page(batched: Sequence[Row], policies: Sequence[Row]) -> str:
     lines = [
         "# The planner in many worlds, and policies that learn from it",
         "",
-        "Written by `python -m benchmarks.planning.batches_page`; not by hand. Humanoid, assisted grasping,",
-        "doors between rooms open at the start.",
+        "Written by `python -m benchmarks.planning.batches_page`; by hand only the last section. Humanoid,",
+        "assisted grasping, doors between rooms open at the start.",
         "",
     ]
     if batched:

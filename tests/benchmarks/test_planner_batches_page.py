@@ -62,3 +62,14 @@ def test_policies_over_primitives_have_a_table_of_their_own():
     text = pages.page([], [row])
     assert "| making_tea | bc | 100 | 400 | 98.0%, 100.0% | 20 | 90% (70% to 97%) | 0.95 | 5.2 |" in text
     assert "held-out loss" not in text
+
+
+def test_what_is_written_by_hand_stays(tmp_path, monkeypatch):
+    page = tmp_path / "page.md"
+    page.write_text(f"# Old\n\n| table |\n\n{pages.OWN}\n\nA note.\n", encoding="utf-8")
+    monkeypatch.setattr("sys.argv", ["batches_page", "--results", str(tmp_path), "--page", str(page)])
+    for _ in range(2):
+        pages.main()
+        text = page.read_text(encoding="utf-8")
+        assert text.startswith("# The planner") and text.endswith(f"\n\n{pages.OWN}\n\nA note.\n")
+        assert "| table |" not in text

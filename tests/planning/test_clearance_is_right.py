@@ -100,3 +100,22 @@ def test_many_places_at_once_are_as_clear_as_one_after_another(query):
     each = [obstacles.clear(spheres + np.array([*p, 0.0])) for p in points]
     assert obstacles.clear_at(spheres, points).tolist() == each
     assert 0 < sum(each) < len(each)
+    nothing = np.zeros((0, 4))  # what was carried was lost on the way
+    assert obstacles.clear(nothing) and obstacles.clear_along(nothing, points[0], np.eye(3)[0], np.zeros(1))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**31))
+def test_places_along_a_line_are_as_clear_as_one_after_another(query, seed):
+    rng = np.random.default_rng(seed)
+    quat = rng.normal(size=4)
+    query.place(query.scene.object_index("box"), rng.uniform((-1, -1, 0.2), (1, 1, 0.8)), quat / np.linalg.norm(quat))
+    obstacles = Obstacles(query.scene, query.view, 0).about((-0.5, 0.2), 0.3, 1.5)
+    obstacles = obstacles.with_carried(np.column_stack([rng.uniform(-1, 1, (5, 3)), np.full(5, 0.03)]))
+    spheres = np.array([[0.0, 0.0, 0.0, 0.03], [0.1, 0.0, 0.02, 0.03], [0.0, 0.15, 0.0, 0.012]])
+    for level in (False, True) * 5:
+        start, ahead = rng.uniform((-1.5, -1.5, 0.0), (1.5, 1.5, 1.2)), rng.normal(size=3) * (1.0, not level, not level)
+        ahead /= np.linalg.norm(ahead)
+        along = np.linspace(0.0, rng.uniform(0.05, 1.0), rng.integers(1, 30))
+        each = [obstacles.clear(spheres + np.array([*(start + t * ahead), 0.0])) for t in along]
+        assert obstacles.clear_along(spheres, start, ahead, along) == all(each)

@@ -19,6 +19,9 @@ class Wall(Obstacles):
         meets = (np.abs(x) < 0.02 + radius) & (np.abs(y) < self.size + radius) & (np.abs(z) < self.size + radius)
         return not meets.any()
 
+    def clear_along(self, spheres, start, ahead, along):
+        return all(self.clear(spheres + np.array([*(start + t * ahead), 0.0])) for t in along)
+
 
 START, GOAL, BALL = np.array([-0.3, 0.0, 0.0]), np.array([0.3, 0.0, 0.0]), np.array([[0.0, 0.0, 0.0, 0.05]])
 

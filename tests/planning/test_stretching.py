@@ -64,6 +64,9 @@ class _Roof(Obstacles):
         x, _, z, radius = spheres.T
         return not ((x + radius > 0) & (np.abs(z) < radius)).any()
 
+    def clear_along(self, spheres, start, ahead, along):
+        return all(self.clear(spheres + np.array([*(start + t * ahead), 0.0])) for t in along)
+
     def distance(self, points):
         return np.full(points.shape[:-1], 0.3)
 

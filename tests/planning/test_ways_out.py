@@ -60,6 +60,9 @@ class _Bucket(Obstacles):
         across = np.hypot(spheres[:, 0], spheres[:, 1]) + spheres[:, 3]
         return not ((spheres[:, 2] < 0.25) & (across > 0.1)).any()
 
+    def clear_along(self, spheres, start, ahead, along):
+        return all(self.clear(spheres + np.array([*(start + t * ahead), 0.0])) for t in along)
+
 
 def test_an_object_falls_from_the_lowest_height_at_which_the_hand_has_room():
     hand, held = [0.12, 0.0, 0.06, 0.03], [0.0, 0.0, 0.0, 0.012]

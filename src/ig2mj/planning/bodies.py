@@ -375,11 +375,18 @@ class HoveringBody(_Body):
 def hand_spheres(fingers: Direction, palm: Direction) -> Float[np.ndarray, "S 4"]:
     """x, y, z from a floating hand's grasp point (world axes) and radius of spheres that hold it open, m; five of the
     palm first."""
-    ahead, back = np.asarray(fingers, float), -BEHIND * np.asarray(palm, float)
-    side = np.cross(ahead, np.asarray(palm, float))
-    corners = [(0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
-    centres = [back + CORNER * (a * ahead + b * side) for a, b in corners] + [back + a * ahead for a in ALONG]
-    return np.array([[*c, RADIUS] for c in centres])
+    (x, y, z), (u, v, w) = fingers, palm
+    side = (y * w - z * v, z * u - x * w, x * v - y * u)
+    return np.concatenate([_OF_HAND @ np.array([fingers, side, palm], float), _RADII], axis=1)
+
+
+_OF_HAND = np.array(
+    [[CORNER * a, CORNER * b, -BEHIND] for a, b in ((0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))]
+    + [[a, 0.0, -BEHIND] for a in ALONG]
+)
+"""m along the fingers, to the side and along the palm from a floating hand's grasp point to the middles of spheres."""
+
+_RADII = np.full((len(_OF_HAND), 1), RADIUS)
 
 
 SPARE_REACH, CARRY, TUCKED = 0.05, (0.34, 0.16, 0.5), (0.1, 0.1, 0.1)

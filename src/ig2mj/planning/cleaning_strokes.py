@@ -80,8 +80,12 @@ class Region:
 
     def at(self, spot: DirtSpot) -> Vector:
         """Grasp point of the hand when the tool is pressed on a particle."""
-        depth = float(np.ptp(self.corners @ spot.normal)) / 2
-        return spot.pos + spot.normal * (depth - PRESSED) - (self.low + self.high) / 2
+        return self.at_all(spot.pos[None], spot.normal[None])[0]
+
+    def at_all(self, pos: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        """`at` of many particles."""
+        depth = np.ptp(normal @ self.corners.T, axis=1) / 2
+        return pos + normal * (depth - PRESSED)[:, None] - (self.low + self.high) / 2
 
     def above(self, spot: DirtSpot) -> Vector:
         """Grasp point of the hand right before."""
@@ -279,7 +283,7 @@ class _From:
                     left &= to_robot
                 if not left.any():
                     break
-                at = np.array([region.at(spots[k]) for k in members])
+                at = region.at_all(pos, normal)
                 room = left & (np.linalg.norm(at - shoulder, axis=1) <= self._world.body.reach)
                 rows = np.flatnonzero(room)
                 room[rows] = self._obstacles.clear_at(spheres, at[rows] + region.lifted * normal[rows])

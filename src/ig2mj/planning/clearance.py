@@ -15,7 +15,7 @@ import itertools
 from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.poses import matrices_on_host
@@ -34,6 +34,13 @@ STEP = 0.03
 LIFTS = (0.1, 0.25, 0.45)
 """m above start and goal at which a hand goes across where the straight way is blocked."""
 
+LEVEL = 1e-12
+"""Share of a direction along an axis below which it is at right angles to it."""
+
+FACES, FIRST = 6, 8
+"""Planes of a box, which most pieces are: those of others that come after these are looked at last. Spheres of a hand
+that are looked at first at each of many places: where these meet something, the others need not be."""
+
 
 @functools.lru_cache(maxsize=4)
 def _planes(tables: SceneTables) -> Float[np.ndarray, "K N 4"]:
@@ -48,6 +55,12 @@ def _planes(tables: SceneTables) -> Float[np.ndarray, "K N 4"]:
     turn = matrices_on_host(tables.piece_quat)
     normal = np.einsum("kij,knj->kni", turn, planes[..., :3])
     return np.concatenate([normal, planes[..., 3:] + np.einsum("kni,ki->kn", normal, tables.piece_pos)[..., None]], -1)
+
+
+@functools.lru_cache(maxsize=4)
+def _has_more(tables: SceneTables) -> Bool[np.ndarray, "K"]:
+    """Pieces with more planes than a box."""
+    return np.any(_planes(tables)[:, FACES:, :3] != 0.0, axis=(1, 2))
 
 
 @functools.lru_cache(maxsize=4)
@@ -121,6 +134,7 @@ class Obstacles:
         self._body: tuple[float, ...] | None = None
         self._carried = np.zeros((0, 4))
         self._normal, self._offset, self._low, self._high = placed.normal, placed.offset, placed.low, placed.high
+        self._more = _has_more(scene.tables)
 
     def distance(self, points: Float[np.ndarray, "*M 3"]) -> Float[np.ndarray, "*M"]:
         """m from points to the nearest piece, at most `FAR`; negative inside."""
@@ -129,8 +143,13 @@ class Obstacles:
         near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
         if not len(near):
             return np.full(points.shape[:-1], FAR)
-        away = np.einsum("kni,...i->...kn", self._normal[near], points) - self._offset[near]
-        return np.minimum(away.max(-1).min(-1), FAR)
+        found = np.full(len(every), FAR)
+        for more, planes in ((False, FACES), (True, self._normal.shape[1])):
+            some = near[self._more[near] == more]
+            if len(some):
+                away = np.einsum("kni,pi->pkn", self._normal[some, :planes], every) - self._offset[some, :planes]
+                found = np.minimum(found, away.max(-1).min(-1))
+        return found.reshape(points.shape[:-1])
 
     def about(self, axis: Sequence[float] | np.ndarray, radius: float, height: float) -> Obstacles:
         """The same with the upright body of a robot at x and y, up to a height, all m. Only what it holds keeps clear
@@ -146,7 +165,7 @@ class Obstacles:
         return other
 
     def clear(self, spheres: Float[np.ndarray, "M 4"]) -> bool:
-        """Whether no sphere (x, y, z, radius) enters a piece."""
+        """Whether no sphere (x, y, z, radius) enters a piece; there may be none: what was held was lost."""
         return not self._enters(spheres[:, :3], spheres[:, 3]).any()
 
     def clear_at(
@@ -158,17 +177,81 @@ class Obstacles:
           together: points that are looked at at once.
         """
         found = np.ones(len(points), bool)
-        for first in range(0, len(points), together):
-            part = points[first : first + together]
-            centre = (part[:, None] + spheres[None, :, :3]).reshape(-1, 3)
-            radius = np.tile(spheres[:, 3], len(part))
-            bad = self._enters(centre, radius)
-            found[first : first + together] = ~bad.reshape(len(part), -1).any(1)
+        for some in (spheres[:FIRST], spheres[FIRST:]):
+            left = np.flatnonzero(found)
+            for first in range(0, len(left), together) if len(some) else ():
+                part = left[first : first + together]
+                centre = (points[part, None] + some[None, :, :3]).reshape(-1, 3)
+                bad = self._enters(centre, np.tile(some[:, 3], len(part)))
+                found[part] = ~bad.reshape(len(part), -1).any(1)
         return found
+
+    def clear_along(
+        self,
+        spheres: Float[np.ndarray, "S 4"],
+        start: np.ndarray,
+        ahead: Float[np.ndarray, "3"],
+        along: Float[np.ndarray, "T"],
+    ) -> bool:
+        """Whether spheres (x, y, z from a point; radius) enter no piece, with the point at some places of a line.
+
+        Each sphere is in a piece between two places of the line, which follow from the piece's planes; one of the
+        places asked about lies between them, or none does.
+
+        Args:
+          start, ahead: a point of the line, m, and its direction, a unit vector. along: m from `start`, ascending.
+        """
+        if not len(spheres):
+            return True
+        centre, radius = spheres[:, :3] + start, spheres[:, 3]
+
+        def meets(first: np.ndarray, last: np.ndarray) -> Bool[np.ndarray, "*n"]:
+            at = along[np.minimum(np.searchsorted(along, first, side="right"), len(along) - 1)]
+            return (first < at) & (at < last)
+
+        if self._body is not None and (held := np.flatnonzero(radius < HELD)).size:
+            x, y, wide, high = self._body
+            first, last = _within(centre[held, :2] - (x, y), ahead[:2], wide + radius[held])
+            below = _where_negative(centre[held, 2] - high, ahead[2])
+            if meets(np.maximum(first, below[0]), np.minimum(last, below[1])).any():
+                return False
+        if len(self._carried):
+            offset = centre[:, None] - self._carried[:, :3]
+            if meets(*_within(offset, ahead, radius[:, None] + self._carried[:, 3])).any():
+                return False
+        bottom, top = centre - radius[:, None], centre + radius[:, None]
+        ends = np.outer((along[0], along[-1]), ahead)
+        low, high = bottom.min(0) + ends.min(0), top.max(0) + ends.max(0)
+        near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
+        if not len(near):
+            return True
+        first, last = np.full((len(centre), len(near)), -np.inf), np.full((len(centre), len(near)), np.inf)
+        for axis in range(3):  # where the boxes of spheres and pieces meet
+            enters, leaves = self._low[near, axis] - top[:, axis, None], self._high[near, axis] - bottom[:, axis, None]
+            if abs(ahead[axis]) < LEVEL:
+                last[(enters >= 0.0) | (leaves <= 0.0)] = -np.inf
+                continue
+            enters, leaves = (enters / ahead[axis], leaves / ahead[axis])[:: 1 if ahead[axis] > 0.0 else -1]
+            first, last = np.maximum(first, enters), np.minimum(last, leaves)
+        sphere, piece = np.nonzero(meets(first, last))
+        for planes in (slice(FACES), slice(FACES, None)):
+            of = near[piece]
+            away = np.einsum("pni,pi->pn", self._normal[of, planes], centre[sphere]) - self._offset[of, planes]
+            begins, ends = _where_negative(away - radius[sphere, None], self._normal[of, planes] @ ahead)
+            begins = np.maximum(first[sphere, piece], begins.max(-1, initial=-np.inf))
+            ends = np.minimum(last[sphere, piece], ends.min(-1, initial=np.inf))
+            first[sphere, piece], last[sphere, piece] = begins, ends
+            inside = meets(begins, ends)
+            if inside.any() and (~self._more[of[inside]]).any():
+                return False
+            sphere, piece = sphere[inside], piece[inside]
+        return not len(sphere)
 
     def _enters(self, centre: Float[np.ndarray, "N 3"], radius: Float[np.ndarray, "N"]) -> Bool[np.ndarray, "N"]:
         """Which spheres enter a piece, or the body."""
         bad = np.zeros(len(centre), bool)
+        if not len(centre):
+            return bad
         if self._body is not None:
             x, y, wide, high = self._body
             held = (radius < HELD) & (centre[:, 2] < high)
@@ -187,8 +270,14 @@ class Obstacles:
             meets &= (centre[:, axis, None] + wide) > self._low[near, axis]
         sphere, piece = np.nonzero(meets)
         piece = near[piece]
-        away = np.einsum("pni,pi->pn", self._normal[piece], centre[sphere]) - self._offset[piece]
-        bad[sphere[away.max(-1, initial=-1.0) < radius[sphere]]] = True
+        for planes in (slice(FACES), slice(FACES, None)):
+            away = np.einsum("pni,pi->pn", self._normal[piece, planes], centre[sphere]) - self._offset[piece, planes]
+            inside = away.max(-1, initial=-1.0) < radius[sphere]
+            sphere, piece = sphere[inside], piece[inside]
+            more = self._more[piece]
+            bad[sphere[~more]] = True
+            last, sphere, piece = sphere, sphere[more], piece[more]
+        bad[last] = True
         return bad
 
     def entries(
@@ -197,6 +286,25 @@ class Obstacles:
         """m along rays (unit vectors) to where each enters the first piece of an object, or of one body; infinite: it
         meets none."""
         mine = np.flatnonzero((self.objects == of) & (True if body is None else self._bodies == body))
+        return self._entered(origins, directions, mine)
+
+    def stand_between(
+        self, origins: Float[np.ndarray, "R 3"], point: Float[np.ndarray, "3"], of: Collection[int], spare: float
+    ) -> Bool[np.ndarray, "R"]:
+        """Whether pieces of some objects are on the lines from origins to a point, up to `spare` (m) before it."""
+        low, high = np.minimum(origins.min(0), point), np.maximum(origins.max(0), point)
+        near = ((self._low <= high) & (self._high >= low)).all(1)
+        mine = np.flatnonzero(near & np.isin(self.objects, list(of)))
+        if not len(mine):
+            return np.zeros(len(origins), bool)
+        apart = np.linalg.norm(point - origins, axis=1)
+        ways = (point - origins) / np.maximum(apart, 1e-9)[:, None]
+        return self._entered(origins, ways, mine) < apart - spare
+
+    def _entered(
+        self, origins: Float[np.ndarray, "R 3"], directions: Float[np.ndarray, "R 3"], mine: Int[np.ndarray, "n"]
+    ) -> Float[np.ndarray, "R"]:
+        """m along rays to where each enters the first of some pieces."""
         slope = np.einsum("kni,ri->rkn", self._normal[mine], directions)
         left = self._offset[mine] - np.einsum("kni,ri->rkn", self._normal[mine], origins)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -239,9 +347,31 @@ def straight(
     along = along[(along >= 0) & (along <= apart - spare)]
     if not len(along) or apart < 1e-6:
         return True
-    points = start + along[:, None] / apart * way
-    centres = (points[:, None] + spheres[None, :, :3]).reshape(-1, 3)
-    return obstacles.clear(np.column_stack([centres, np.tile(spheres[:, 3], len(points))]))
+    return obstacles.clear_along(spheres, np.asarray(start, float), way / apart, along)
+
+
+def _where_negative(
+    value: Float[np.ndarray, "*n"], slope: Float[np.ndarray, "*#n"] | float
+) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
+    """Between which t `value + slope * t` is below 0; the first is not below the second where it never is."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = -value / slope
+    level = np.abs(slope) < LEVEL
+    first = np.where(level, np.where(value < 0.0, -np.inf, np.inf), np.where(slope < 0.0, at, -np.inf))
+    last = np.where(level, np.where(value < 0.0, np.inf, -np.inf), np.where(slope > 0.0, at, np.inf))
+    return first, last
+
+
+def _within(
+    offset: Float[np.ndarray, "*n d"], ahead: Float[np.ndarray, "d"], radius: Float[np.ndarray, "*n"]
+) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
+    """Between which t `offset + t * ahead` is nearer to the origin than `radius`; see `_where_negative`."""
+    a, b, c = float(ahead @ ahead), offset @ ahead, (offset * offset).sum(-1) - radius * radius
+    if a < LEVEL:
+        return np.where(c < 0.0, -np.inf, np.inf), np.where(c < 0.0, np.inf, -np.inf)
+    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
+    never = b * b <= a * c
+    return np.where(never, np.inf, (-b - root) / a), np.where(never, -np.inf, (-b + root) / a)
 
 
 def hand_way(

@@ -91,7 +91,7 @@ def _nearer(world: PlannedWorld, step: Step, point: Float[np.ndarray, "3"]) -> f
     middles, obstacles = floor.occupancy.middles(cells), world.obstacles()
     apart = np.linalg.norm(middles - point[:2], axis=1)
     for k in np.argsort(apart)[:: max(1, len(apart) // LOOKED_AT)]:
-        if not behind_wall(world, obstacles, middles[k], point):
+        if not behind_wall(world, obstacles, middles[k][None], point)[0]:
             far = float(apart[k]) - GAIN
             break
     freed = world.floor(without=[world.index(n) for n in _loose(world, step)])
@@ -108,7 +108,7 @@ def nearest_floor(world: PlannedWorld, floor: FreeFloor, point: Float[np.ndarray
     for k in np.argsort(away)[:: max(1, len(away) // LOOKED_AT)]:
         if not np.isfinite(away[k]):
             return None
-        if not behind_wall(world, obstacles, middles[k], point):
+        if not behind_wall(world, obstacles, middles[k][None], point)[0]:
             return middles[k]
     return None
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ig2mj.agents.humanoid.frames import BODY_HEIGHT
 from ig2mj.agents.humanoid.robot import BODY_RADIUS
@@ -25,6 +25,9 @@ and to the side, so that the hand reaches 0.3 m farther than ahead to its side, 
 
 EFFORT = 1.0
 """m of way that a metre by which the body stoops, or stretches, counts as."""
+
+TOGETHER = 48
+"""Places of which walls are asked at once."""
 
 WALL = 0.02
 """m before a point from which on a wall does not count: a switch is on it."""
@@ -69,11 +72,15 @@ def stances(
     cost += np.where(np.isnan(rise), np.inf, EFFORT * np.abs(rise))
     if before is not None:
         cost[(middles - before[0][:2]) @ before[1][:2] <= 0.0] = np.inf
-    count, obstacles = 0, world.obstacles()
+    count, obstacles, unknown = 0, world.obstacles(), np.ones(len(cost), bool)
     while len(cost) and np.isfinite(cost[best := int(np.argmin(cost))]):
-        if behind_wall(world, obstacles, middles[best], point) or not _stretches(
-            world, obstacles, middles[best], rise[best]
-        ):
+        if unknown[best]:
+            some = np.flatnonzero(unknown & np.isfinite(cost))
+            some = some[np.argsort(cost[some])[:TOGETHER]]
+            unknown[some] = False
+            cost[some[behind_wall(world, obstacles, middles[some], point)]] = np.inf
+            continue
+        if not _stretches(world, obstacles, middles[best], rise[best]):
             cost[best] = np.inf
             continue
         cost[np.linalg.norm(middles - middles[best], axis=1) < APART] = np.inf
@@ -109,12 +116,12 @@ def reaching_with(
     return dataclasses.replace(stance, rise=rise)
 
 
-def behind_wall(world: PlannedWorld, obstacles: Obstacles, xy: Float[np.ndarray, "2"], point: Vector) -> bool:
-    """Whether a wall stands between a robot and a point."""
-    start = np.array([*xy, point[2]])
-    apart = float(np.linalg.norm(point - start))
-    way = (point - start)[None] / max(apart, 1e-9)
-    return any(obstacles.entries(start[None], way, wall)[0] < apart - WALL for wall in world.walls)
+def behind_wall(
+    world: PlannedWorld, obstacles: Obstacles, xy: Float[np.ndarray, "n 2"], point: Vector
+) -> Bool[np.ndarray, "n"]:
+    """Between which places of a robot and a point a wall stands."""
+    starts = np.column_stack([xy, np.full(len(xy), point[2])])
+    return obstacles.stand_between(starts, point, world.walls, WALL)
 
 
 def clear_with_held(world: PlannedWorld, stances: Sequence[Stance]) -> bool:

@@ -130,12 +130,14 @@ class RequestBench:
             return
         x, y = start_place(bare, self._sampler.query.view, ())
         scene = load_scene(home, agents=[body.at(x, y, 0.0)], objects=ADDED)
-        self._query = SceneQuery(scene)
+        self._query, self._planner = SceneQuery(scene), MotionPlanner(scene)
         if rung == "physics":
             self._simulation = Simulation(scene, seed=seed, grasping="assisted")
-            self._simulation.agent.rung.step()  # compiles, in no request's time
+            own = self._simulation.agent.rung
+            own.step()  # compiles, in no request's time
+            self._body = own.body
         else:
-            self._stage, self._planner = KinematicStage(scene), MotionPlanner(scene)
+            self._stage = KinematicStage(scene)
 
     def run(self, primitive: str, number: int) -> dict[str, Any]:
         """Draws a request and carries it out; see the module's text."""
@@ -217,7 +219,8 @@ class RequestBench:
             simulation._write(write)
             engine = simulation.engine
             simulation.step(count=round(DOORS_SETTLE / (engine.substeps * engine.timestep)))
-        return PhysicsRung(simulation.agent.rung.stage, self._seed, number, self._query)
+        stage = simulation.agent.rung.stage
+        return PhysicsRung(stage, self._seed, number, self._query, self._planner, self._body)
 
     def _carried_out(self, rung: Rung, request: Request) -> Outcome:
         """The outcome on a rung; of a grasp that comes before it, if that fails."""
