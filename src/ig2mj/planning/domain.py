@@ -18,6 +18,7 @@ from ig2mj.predicates.registry import find
 from ig2mj.predicates.substances import substance_index
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.rules import PLACEMENTS
+from ig2mj.scene.extras import attached_as_text
 from ig2mj.states.model import StateModel
 from ig2mj.states.substances.applying import sprays
 from ig2mj.states.substances.model import ALWAYS
@@ -246,6 +247,8 @@ class Domain:
             return ""
         if predicate.ability is not None and not self.has(name, predicate.ability):
             return f"'{name}' is not {predicate.ability}" if value else ""
+        if condition.predicate == "attached":
+            return self._cannot_be_attached(name, condition.arguments[1], value)
         if condition.predicate in ("filled", "contains", "saturated", "covered"):
             return self._cannot_receive(condition.predicate, name, condition.arguments[1], value)
         return self._unchangeable(condition.predicate, name, value)
@@ -277,6 +280,19 @@ class Domain:
             return ""
         others = [n for n in self.pourable if n != name]
         return "" if others else f"no container can be carried to '{name}' to pour {substance} out of it"
+
+    def attachable(self, name: str) -> tuple[str, ...]:
+        """Objects that an object can be attached to."""
+        joints, names = self.model.joints, self.model.tables.object_names
+        return () if joints is None else tuple(names[p] for p in joints.parent[joints.child == self.index(name)])
+
+    def _cannot_be_attached(self, name: str, other: str, value: bool) -> str:
+        """Why no primitive attaches an object to another, or takes it off."""
+        if not value:
+            return f"no primitive takes '{name}' off '{other}'"
+        if other not in self.attachable(name):
+            return f"'{name}' cannot be attached to '{other}' (add '{attached_as_text(name, other)}')"
+        return "" if self.graspable(name) else f"no hand takes hold of '{name}'"
 
     def _mover(self, condition: Condition) -> str | None:
         """The object to be moved so that a placement becomes true: the first argument, or where that is fixed and the
@@ -343,6 +359,7 @@ _CHANGES = {
     "contains": True,
     "saturated": True,
     "covered": True,
+    "attached": True,
 }
 """Predicates of one object, or of an object and a substance, that primitives change, and to what (open and toggled_on
 both ways)."""

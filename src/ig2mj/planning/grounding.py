@@ -38,6 +38,7 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
         "scrub": [n for n in things if domain.has(n, "stainable")],
         "soak": [n for n in loose if domain.has(n, "soakable")],
         "fill": [n for n in loose if n in domain.fillable],
+        "attach": [n for n in loose if domain.attachable(n)],
         "pour": list(domain.pourable),
         "spray": [n for n in problem.named if n in things and n not in domain.sprays],
         "slice": [n for n in things if domain.has(n, "sliceable")],
@@ -64,6 +65,8 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
             others = second.get(primitive, things)
             if primitive in ("cook", "freeze"):
                 others = [s.name for s in (domain.heaters if primitive == "cook" else domain.coolers)(name)]
+            if primitive == "attach":
+                others = domain.attachable(name)
             last = [(s,) for s in substances] if SUBSTANCE in kind.arguments else [()]
             pairs = itertools.product(others, last)
             yield from (make_step(primitive, (name, other, *more)) for other, more in pairs if other != name)

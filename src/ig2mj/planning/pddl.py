@@ -31,7 +31,7 @@ DOMAIN = """\
     (sliced ?o - thing) (cooked ?o - thing) (frozen ?o - thing)
     (filled ?o - thing ?l - substance) (contains ?o - thing ?l - substance) (container ?o - thing)
     (covered ?o - thing ?l - substance) (saturated ?o - thing ?l - substance) (absorbs ?o - thing)
-    (sprays ?o - thing)
+    (sprays ?o - thing) (attached ?o ?s - thing) (fits ?o ?s - thing)
     (openable ?o - thing) (switched ?o - thing) (tool ?o - thing) (knife ?o - thing) (tap ?o - thing)
     (heats ?s ?o - thing) (cools ?s ?o - thing) (acts_inside ?s - thing) (needs_switch ?s - thing)
     (needs_closed ?s - thing))
@@ -50,6 +50,9 @@ DOMAIN = """\
   (:action release :parameters (?o - thing ?h - hand)
     :precondition (in_hand ?o ?h)
     :effect (and (not (in_hand ?o ?h)) (not (held ?o)) (free ?h)))
+  (:action attach :parameters (?o ?s - thing ?h - hand)
+    :precondition (and (in_hand ?o ?h) (fits ?o ?s))
+    :effect (and (not (in_hand ?o ?h)) (not (held ?o)) (free ?h) (attached ?o ?s)))
   (:action push :parameters (?o ?s - thing ?h - hand)
     :precondition (free ?h)
     :effect (in_contact_with ?o ?s))
@@ -145,6 +148,7 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
         lines += [f"({word} {n})" for n in things if domain.has(n, ability)]
     lines += [f"(tap {n})" for n in things if n in domain.taps]
     lines += [f"(container {n})" for n in things if domain.contains(n)]
+    lines += [f"(fits {n} {other})" for n in things for other in domain.attachable(n) if other in things]
     lines += [f"(sprays {n})" for n in things if n in domain.sprays]
     lines += [f"(absorbs {n})" for n in things if domain.absorbs(n)]
     for source in (s for s in domain.sources if s.name in things):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ig2mj.planning.attaching import attach
 from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.cleaning import clean
 from ig2mj.planning.doors import through_doors
@@ -96,5 +97,6 @@ ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {
     "freeze": freeze,
     "push": push,
     "spray": spray,
+    "attach": attach,
 }
 """Primitives that are carried out in physics."""

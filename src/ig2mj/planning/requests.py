@@ -89,6 +89,7 @@ class RequestSource:
             "soak": [n for n in self._loose if domain.has(n, "soakable")] + [self._rag],
             "fill": [n for n in self._loose if n in domain.fillable],
             "pour": [n for n in self._loose if n in domain.pourable],
+            "attach": [n for n in self._loose if domain.attachable(n)],
             "slice": [n for n in self._loose if domain.has(n, "sliceable")] + [self._fruit],
             "cook": [n for n in self._loose if domain.has(n, "cookable")] + [self._meat],
             "freeze": [n for n in self._loose if domain.has(n, "freezable")] + [self._fruit],
@@ -109,6 +110,7 @@ class RequestSource:
             "fill": domain.taps,
             "pour": self._things,
             "spray": domain.sprays,
+            "attach": domain.attachable(name) if name else (),
         }
         if primitive in ("cook", "freeze"):
             sources = domain.heaters(name) if primitive == "cook" else domain.coolers(name)
@@ -138,7 +140,7 @@ class RequestSource:
             return [true("open" if primitive == "close" else "toggled_on", name)], ()
         if primitive == "place_inside":
             return [true("open", second)] if self._domain.opens(second) else [], (name,)
-        if primitive.startswith("place_") or primitive == "release":
+        if primitive.startswith("place_") or primitive in ("release", "attach"):
             return [], (name,)
         if primitive == "wipe":
             return [true("dusty", name)], (second,)

@@ -78,6 +78,8 @@ class StepBuilder:
                 self._soak(part)
         elif c.predicate in RECEIVED:
             self._supply(c)
+        elif c.predicate == "attached":
+            self._attach(*c.arguments)
         elif c.predicate == "cooked":
             for part in self._parts(name, c):
                 self._cook(part)
@@ -251,15 +253,26 @@ class StepBuilder:
         if chosen.tap:
             self._hold_below_tap("fill", chosen.source)
         self._reach(name)
-        if name in self._held:
-            near = min(self._domain.supports, key=self._far_from(name), default="")
-            self._put(*(("place_on_top", name, near) if near else ("place_on_floor", name, self._facts.room(name))))
+        self._set_down(name)
         self._take(chosen.source)
         if chosen.primitive == "pour":
             self._add("pour", chosen.source, name, substance, also=(c,))
         else:
             self._free_hand(chosen.source)
             self._add("spray", name, chosen.source, substance, also=(c,))
+
+    def _attach(self, name: str, other: str) -> None:
+        self._reach(other)
+        self._set_down(other)
+        self._take(name)
+        self._add("attach", name, other)
+        self._held.remove(name)
+
+    def _set_down(self, name: str) -> None:
+        """Puts what is held onto the nearest support, where something is done to it."""
+        if name in self._held:
+            near = min(self._domain.supports, key=self._far_from(name), default="")
+            self._put(*(("place_on_top", name, near) if near else ("place_on_floor", name, self._facts.room(name))))
 
     def _far_from(self, name: str) -> Callable[[str], float]:
         return lambda other: float(np.linalg.norm(self._facts.place(other) - self._facts.place(name)))

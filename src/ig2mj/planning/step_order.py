@@ -2,8 +2,9 @@
 
 1. what is opened for its own sake; what is cut, cleaned, soaked, cooked, filled and covered, where it stands;
 2. what is taken away, then what is placed: supports before what they bear, large things before small ones;
-3. what is frozen;
-4. what is switched and shut.
+3. what is attached;
+4. what is frozen;
+5. what is switched and shut.
 
 What a hand holds already comes before, and what has failed several times comes last.
 """
@@ -46,12 +47,13 @@ def ordered(
     places.sort(key=lambda c: (failed.get(c, 0), targets.index(c.arguments[-1]), -domain.volume(c.arguments[0])))
     away = [c for c in places if not c.value]
     down = supports_first([c for c in places if c.value])
+    attached = [c for c in missing if c.predicate == "attached"]
     frozen = [c for c in missing if c.predicate == "frozen"]
     opens = [c for c in missing if c.predicate == "open" and c.value]
     switches = [c for c in missing if c.predicate == "toggled_on"]
     shut = [c for c in missing if c.predicate == "open" and not c.value]
-    order = [*opens, *first, *away, *down, *frozen, *switches, *shut]
-    in_hand = [c for c in order if c.arguments[0] in held and c.predicate in (*PLACE, *FIRST)]
+    order = [*opens, *first, *away, *down, *attached, *frozen, *switches, *shut]
+    in_hand = [c for c in order if c.arguments[0] in held and c.predicate in (*PLACE, *FIRST, "attached")]
     tools = [c for c in order if c.predicate in ("dusty", "stained", "sliced") and tool(c) in held]
     order = list(dict.fromkeys([*tools, *in_hand, *order]))
     tried = [c for c in order if failed.get(c, 0) < GIVE_UP]

@@ -127,6 +127,10 @@ _PRIMITIVES = (
         "covered(object, substance); of what absorbs, saturated",
         one_of=(("covered", "?0", "?2"), ("saturated", "?0", "?2")),
     ),
+    Primitive(
+        "attach", ("object", "other"), "the object is in a hand", "attached(object, other); the hand lets go of it",
+        (("attached", "?0", "?1"),),
+    ),
 )  # fmt: skip
 
 SUBSTANCE = "substance"

@@ -102,7 +102,7 @@ class SymbolicRung:
         elif step.adds:
             if failure := self._make_true(world, own, step):
                 return failure
-            if step.primitive.startswith("place_"):
+            if step.primitive.startswith("place_") or step.primitive == "attach":
                 own.held.remove(step.object)
         return Outcome()
 
@@ -140,7 +140,7 @@ class SymbolicRung:
         name, kind, last = step.object, step.primitive, step.arguments[-1]
         second = step.arguments[1] if len(step.arguments) > 1 else ""
         acting = second if kind in ("cook", "freeze") else ""  # it acts on what is shut in it
-        about = second if kind == "pour" else name
+        about = second if kind in ("pour", "attach") else name
         around = facts.containers(about) if about not in held and kind not in ("navigate_to", "release") else ()
         shut = [c for c in around if c != acting and not facts.holds("open", c)]
         if kind == "grasp":
@@ -154,13 +154,13 @@ class SymbolicRung:
                 return f"{name} is fixed"
         if kind in ("open", "close", "push", "spray") and self._domain.hands_taken(held) >= self._domain.hands:
             return f"the hands are full: {', '.join(held)}"
-        if (kind.startswith("place_") or kind in ("release", "soak", "fill", "pour")) and name not in held:
+        if (kind.startswith("place_") or kind in ("release", "soak", "fill", "pour", "attach")) and name not in held:
             return f"no hand holds {name}"
         if kind in ("wipe", "scrub", "slice", "spray") and second not in held:
             return f"no hand holds {second}"
         if kind == "scrub" and not facts.holds("soaked", second):
             return f"{second} is not soaked"
-        if kind in ("fill", *BRINGS) and (why := self._domain.impossible(step.adds[0])):
+        if kind in ("fill", "attach", *BRINGS) and (why := self._domain.impossible(step.adds[0])):
             return why
         if kind in BRINGS and not facts.holds("contains", tool := BRINGS[kind](step), last):
             return f"{tool} contains no {last}"

@@ -30,6 +30,7 @@ from ig2mj.sampling.conditions import Condition
 
 STEPS_OF = {
     "open": 1.0,
+    "attached": 2.0,
     "toggled_on": 1.0,
     "sliced": 2.0,
     "dusty": 2.5,

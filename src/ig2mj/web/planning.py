@@ -268,6 +268,8 @@ def offers(
         found[f"Pour {substance} out of {tool}"] = ("pour", tool, name, substance)
         if tool in domain.sprays:
             found[f"Spray with {substance}"] = ("spray", name, tool, substance)
+    if name in domain.attachable(tool):
+        found[f"Attach {tool}"] = ("attach", tool, name)
     if domain.has(tool, "cookable") and domain.has(name, "heatSource"):
         found[f"Cook {tool}"] = ("cook", tool, name)
     return {text: words for text, words in found.items() if words[0] in PRIMITIVES}

@@ -244,12 +244,15 @@ class _Clauses:
     def _do(self, kind: str, objects: Sequence[Phrase]) -> None:
         """A primitive on objects, with the tool or the source that follows."""
         reader = self.reader
-        if kind == "push":
+        if kind in ("push", "attach"):
             names = self._names(objects)
-            if not reader.take("against", "up to", "to", "towards", "into"):
+            if not reader.take("against", "up to", "to", "towards", "onto", "into", "on", "in"):
                 raise self._unknown("'to' or 'against'")
             (other,) = self._target()
-            self.steps.extend(make_step("push", (n, other)) for n in names)
+            self.steps.extend(make_step(kind, (n, other)) for n in names)
+            for wish in (w for step in self.steps[-len(names) :] for w in step.adds if kind == "attach"):
+                if reason := self.domain.impossible(wish):
+                    raise NotUnderstoodError(f"cannot attach {wish.arguments[0]}: {reason}")
             return
         if kind in PRIMITIVES and len(PRIMITIVES[kind].arguments) == 1:
             self._each(kind, objects)
