@@ -85,3 +85,24 @@ def test_a_robot_carries_out_primitives_in_physics():
     env.reset(seed=0)
     _, _, _, _, info = env.step(env.action_of("grasp", "apple_0"))
     assert info["held"] == ("apple_0",) and info["time"] > 0
+
+
+def test_a_home_has_the_objects_and_substances_that_are_asked_for():
+    objects = ["carafe@on_top:breakfast_table_0", "substances:water@carafe_0"]
+    made = ig2mj.make(
+        "goal/small_home (filled mug_0 water)", action_space="primitives", rung="symbolic", objects=objects
+    )
+    made.reset(seed=0)
+    assert "(contains carafe_0 water)" in made.describe() and "(contains mug_0 water)" not in made.describe()
+    for words in (("grasp", "carafe_0"), ("pour", "carafe_0", "mug_0", "water")):
+        *_, terminated, _, info = made.step(made.action_of(*words))
+        assert not info["reason"], info
+    assert terminated and info["success"] and "(contains mug_0 water)" in made.describe()
+    arguments = {"object": "carafe_0", "target": "mug_0", "substance": "beer"}
+    with pytest.raises(UnknownNameError, match="no substance in use is named 'beer'"):
+        made.step({"name": "pour", "arguments": arguments})
+
+
+def test_an_activity_with_objects_of_its_own_takes_no_others():
+    with pytest.raises(PlanningError, match="has its own objects"):
+        ig2mj.make("activity/cleaning_windows", action_space="primitives", rung="symbolic", objects=["mug"])

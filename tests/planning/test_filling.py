@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import ig2mj
+from ig2mj.agents.humanoid import Humanoid
 from ig2mj.cli.common.planning import domain_of, expression_of
 from ig2mj.errors import AbilityError
 from ig2mj.planning.domain import Domain
@@ -13,8 +14,8 @@ from ig2mj.planning.grounding import ground_steps
 from ig2mj.planning.pddl import write_pddl
 from ig2mj.planning.problem import problem_of
 from ig2mj.planning.requests import RequestSource
-from ig2mj.planning.steps import PlanningError, Step
-from ig2mj.planning.symbolic import start_facts
+from ig2mj.planning.steps import PlanningError, Step, make_step
+from ig2mj.planning.symbolic import start_facts, symbolic_episodes
 from ig2mj.planning.task_planner import TaskPlanner
 from ig2mj.predicates.literals import AbilityWarning, resolve
 from ig2mj.predicates.logic import Atom
@@ -42,7 +43,32 @@ def planned(goal: str, folder=None) -> list[str]:
 
 @pytest.mark.parametrize("goal", ["(filled bowl_0 water)", "(contains bowl_0 water)", "fill the bowl with water"])
 def test_a_bowl_is_filled_below_a_tap_that_runs(goal):
-    assert planned(goal) == ["toggle_on sink_0", "grasp bowl_0", "fill bowl_0 sink_0"]
+    assert planned(goal)[2:] == ["toggle_on sink_0", "grasp bowl_0", "fill bowl_0 sink_0"]
+
+
+def test_what_lies_in_a_bowl_is_taken_out_first():
+    out, down = planned("(filled bowl_0 water)")[:2]
+    assert out == "grasp apple_0" and down.startswith("place_on_top apple_0 ")
+    assert planned("(and (filled bowl_0 water) (inside apple_0 bowl_0))")[-1] == "fill bowl_0 sink_0"
+    problem = problem_of("small_home", "(filled bowl_0 water)")
+    known = domain_of(problem, "humanoid")
+    ((_, rung),) = symbolic_episodes(known, problem.scene, None, [0])
+    assert rung.facts(0).things_in("bowl_0") == ("apple_0",)
+    for words in ("toggle_on sink_0", "grasp bowl_0"):
+        rung.begin(0, make_step(words.split()[0], words.split()[1:]))
+        assert rung.advance()[0].done
+    rung.begin(0, make_step("fill", ("bowl_0", "sink_0")))
+    assert rung.advance()[0].detail == "apple_0 is in bowl_0"
+
+
+@pytest.mark.slow
+def test_the_humanoid_takes_an_apple_out_of_the_bowl_that_it_is_asked_to_fill():
+    scene = ig2mj.load_scene("small_home", agents=[Humanoid().at(-1.0, 0.0, 0.0)], substances=["water"])
+    simulation = ig2mj.Simulation(scene, grasping="assisted")
+    for request in ("toggle_on sink_0", "grasp bowl_0", "fill bowl_0 sink_0"):
+        outcome = simulation.agent.do(*request.split())
+        assert outcome.done, f"{request}: {outcome}"
+    assert simulation.holds("(and (filled bowl_0 water) (not (inside apple_0 bowl_0)))")
 
 
 def test_water_that_is_in_use_already_is_so_once():

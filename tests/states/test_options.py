@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
 from ig2mj.errors import StateError, UnknownNameError
-from ig2mj.states import StateOptions
+from ig2mj.states import StateModel, StateOptions
+from ig2mj.states.options import NoEffectWarning
 
 
 @pytest.mark.parametrize(
@@ -30,3 +33,11 @@ def test_numbers_and_switches_of_numpy_are_taken():
 def test_misspelt_rules_are_refused_with_near_matches():
     with pytest.raises(UnknownNameError, match="near matches: igibson"):
         StateOptions(compat="ibigson")
+
+
+def test_dirt_that_spreads_warns_where_no_substance_is_in_use(tiny_home):
+    with pytest.warns(NoEffectWarning, match="--substances mud"):
+        StateModel.of_manifest(tiny_home.tables, tiny_home.manifest, StateOptions(soiling=True))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        StateModel.of_manifest(tiny_home.tables, tiny_home.manifest, StateOptions(drying_rate=1.0))

@@ -14,6 +14,7 @@ Axes: F facts.
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -26,7 +27,7 @@ from ig2mj.envs.planning_stage import EnvironmentStage, problem_env
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
-from ig2mj.planning.grounding import ground_steps, named_things
+from ig2mj.planning.grounding import ground_steps, named_things, substances_to_move
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.problem import Problem, problem_of
 from ig2mj.planning.rung import Rung
@@ -38,6 +39,7 @@ from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.quality import quality
 from ig2mj.process import entry_point
 from ig2mj.sampling.query import SceneQuery
+from ig2mj.tasks.added_objects import object_texts
 from ig2mj.tasks.own_goal import split_goal_name
 
 HORIZON = 60
@@ -71,21 +73,24 @@ class PrimitiveEnv(gymnasium.Env):
         split: str = "train",
         pool_size: int = 16,
         horizon: int = HORIZON,
+        objects: str | os.PathLike | Sequence[str | os.PathLike] = (),
     ):
         """
         Args:
           name: as of `ig2mj.make`: "activity/NAME", "goal/HOME GOAL", or an activity of the paper.
           rung: "physics" or "symbolic": what carries out the primitives. split, pool_size: start states.
           horizon: primitives of an episode.
+          objects: of a goal in a home: what is added to it, and its substances (`load_scene`).
 
         Raises:
-          UnknownNameError: no such activity, rung or robot. PlanningError: motion of the robot cannot be planned.
+          UnknownNameError: no such activity, rung or robot. PlanningError: motion of the robot cannot be planned, or
+          there are objects for an activity, which has its own.
         """
         if rung not in RUNGS:
             raise UnknownNameError("rung", rung, RUNGS)
         if horizon < 1 or pool_size < 1:
             raise EngineError(f"horizon={horizon}, pool_size={pool_size}: at least 1 each")
-        self.problem: Problem = problem_of(*(split_goal_name(name) or (name,)))
+        self.problem: Problem = problem_of(*(split_goal_name(name) or (name,)), objects=object_texts(objects))
         self._robot, self._kind, self._split, self._horizon = robot, rung, split, horizon
         self.domain = Domain.of_robot(self.problem.model, make_robot(robot))
         if self.domain.hands < 1:
@@ -111,7 +116,7 @@ class PrimitiveEnv(gymnasium.Env):
     # What is seen.
 
     def _observed(self, things: Sequence[str]) -> tuple[Atom, ...]:
-        """Atoms of the goal, then states of the things."""
+        """Atoms of the goal, then states of the things, and what they contain."""
         ability = {"open": "openable", "toggled_on": "toggleable", "soaked": "soakable", "sliced": "sliceable"}
         ability |= {"dusty": "dustyable", "stained": "stainable", "cooked": "cookable", "frozen": "freezable"}
         states = [
@@ -119,7 +124,9 @@ class PrimitiveEnv(gymnasium.Env):
             for n, (predicate, word) in itertools.product(things, ability.items())
             if self.domain.has(n, word)
         ]
-        return tuple(dict.fromkeys([*self.problem.goal.atoms, *states]))
+        liquids = substances_to_move(self.domain, self.problem)
+        contents = [Atom("contains", pair) for pair in itertools.product(filter(self.domain.contains, things), liquids)]
+        return tuple(dict.fromkeys([*self.problem.goal.atoms, *states, *contents]))
 
     def _observation(self, facts: Facts) -> Int8[np.ndarray, "F"]:
         truth = facts.truth(self._atoms)

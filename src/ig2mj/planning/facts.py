@@ -88,6 +88,17 @@ class Facts:
         truth = self.truth(near)
         return tuple(a.arguments[1] for a in near if truth[a])
 
+    def things_in(self, name: str) -> tuple[str, ...]:
+        """Loose objects inside of an object, but for what hands hold."""
+        low, high = self.box(name)
+        near = []
+        for other in self.domain.loose:
+            middle = self.place(other)
+            if other not in (name, *self.held) and (low <= middle).all() and (middle[:2] <= high[:2]).all():
+                near.append(Atom("inside", (other, name)))
+        truth = self.truth(near)
+        return tuple(a.arguments[0] for a in near if truth[a])
+
     def room(self, name: str) -> str:
         """Room instance above whose floor an object is; the home's floor object where the map has none there."""
         tables = self.domain.model.tables

@@ -55,7 +55,7 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
         "pour": [n for n in problem.named if n in things],
         "spray": domain.sprays,
     }
-    substances = _substances(domain, problem)
+    substances = substances_to_move(domain, problem)
     for primitive, kind in PRIMITIVES.items():
         first = able.get(primitive, loose)
         if len(kind.arguments) == 1:
@@ -72,7 +72,7 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
             yield from (make_step(primitive, (name, other, *more)) for other, more in pairs if other != name)
 
 
-def _substances(domain: Domain, problem: Problem) -> list[str]:
+def substances_to_move(domain: Domain, problem: Problem) -> list[str]:
     """Those that the goal names, or if it names none, all in use, as far as containers hold them."""
     found = domain.model.substances
     if found is None:

@@ -277,7 +277,17 @@ class StepBuilder:
     def _far_from(self, name: str) -> Callable[[str], float]:
         return lambda other: float(np.linalg.norm(self._facts.place(other) - self._facts.place(name)))
 
+    def _empty(self, name: str) -> None:
+        """Takes loose things out of a container, and puts them onto the nearest support."""
+        for thing in self._facts.things_in(name):
+            if not self._domain.graspable(thing) or self._failures(("grasp", thing)) >= CLEARED:
+                continue
+            self._take(thing)
+            self._set_down(thing)
+
     def _hold_below_tap(self, primitive: str, name: str) -> None:
+        if primitive == "fill":
+            self._empty(name)
         taps = self._domain.taps
         far = {t: float(np.linalg.norm(self._facts.place(t) - self._facts.place(name))) for t in taps}
         tap = min(taps, key=lambda t: (self._failures(("toggle_on", t), (primitive, name, t)), far[t]))

@@ -98,7 +98,8 @@ _PRIMITIVES = (
         (("not", "stained", "?0"),),
     ),
     Primitive(
-        "fill", ("object", "source"), "the object, a container, is in a hand; the water runs", "filled(object, water)",
+        "fill", ("object", "source"), "the object, a container, is in a hand, nothing is in it; the water runs",
+        "filled(object, water)",
         (("filled", "?0", "water"),),
     ),
     Primitive("slice", ("object", "knife"), "the knife is in a hand", "sliced(object)", (("sliced", "?0"),)),

@@ -22,6 +22,10 @@ RECEIVED = ("contains", "filled", "saturated", "covered")
 """Predicates of an object and a substance that primitives make true."""
 
 
+OUT = 2
+"""Steps in which a loose thing is taken out of a container that is filled at a tap."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Supply:
     """One way.
@@ -80,7 +84,8 @@ def required_litres(facts: Facts, condition: Condition) -> float:
 
 
 def supplies(facts: Facts, condition: Condition, required: Sequence[Condition] = ()) -> list[Supply]:
-    """The ways, those with fewest steps first; none: there is too little of the substance.
+    """The ways, those with fewest steps first, last those in which another container is filled at a tap; none: there is
+    too little of the substance.
 
     Args:
       condition: that is to become true. required: conditions that are to hold in the end: what they want in a
@@ -104,10 +109,10 @@ def supplies(facts: Facts, condition: Condition, required: Sequence[Condition] =
         jugs = [y for y in others if y in domain.fillable and y not in able and not _wanted(y, WATER, required)]
         found += [Supply("pour", y, tap) for y in jugs for tap in domain.taps]
 
-    def rank(supply: Supply) -> tuple[int, bool, float]:
+    def rank(supply: Supply) -> tuple[bool, int, bool, float]:
         kept = supply.primitive == "pour" and bool(_wanted(supply.source, substance, required))
         order = -domain.litres(supply.source) if supply.tap else _far(facts, supply.source, name)
-        return _steps(facts, name, supply), kept, order
+        return bool(supply.tap), _steps(facts, name, supply), kept, order
 
     return sorted(found, key=rank)
 
@@ -119,7 +124,9 @@ def _steps(facts: Facts, name: str, supply: Supply) -> int:
     runs = not tap or not facts.domain.has(tap, "toggleable") or facts.holds("toggled_on", tap)
     around = {c for n in (name, moved) if n not in facts.held for c in facts.containers(n)}
     shut = sum(not facts.holds("open", c) for c in around)
-    return 1 + (moved not in facts.held) + shut + (not runs) + bool(supply.tap)
+    filled = moved if supply.primitive == "fill" or supply.tap else ""
+    out = OUT * len(facts.things_in(filled)) if filled else 0
+    return out + 1 + (moved not in facts.held) + shut + (not runs) + bool(supply.tap)
 
 
 def lacking(facts: Facts, condition: Condition) -> str:

@@ -162,6 +162,8 @@ class SymbolicRung:
             return f"{second} is not soaked"
         if kind in ("fill", "attach", *BRINGS) and (why := self._domain.impossible(step.adds[0])):
             return why
+        if kind == "fill" and (things := facts.things_in(name)):
+            return f"{', '.join(things)} {'are' if len(things) > 1 else 'is'} in {name}"
         if kind in BRINGS and not facts.holds("contains", tool := BRINGS[kind](step), last):
             return f"{tool} contains no {last}"
         if (

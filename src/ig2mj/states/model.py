@@ -9,13 +9,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Int
 
+from ig2mj.process.user_warning import warn_user
 from ig2mj.scene.extras import ATTACHED, ON_FIRE, names_of
 from ig2mj.scene.manifest import InsideEntry, Manifest
 from ig2mj.scene.tables import LinkKind, SceneTables
 from ig2mj.states.added import added_states, extra_states, substance_states
 from ig2mj.states.definitions import on_fire
 from ig2mj.states.definitions.attached import Joints
-from ig2mj.states.options import StateOptions
+from ig2mj.states.options import NoEffectWarning, StateOptions
 from ig2mj.states.parameters import StateParameters, parameters_of_manifest
 from ig2mj.states.spec import StateSpec
 from ig2mj.states.substances.model import SubstanceModel
@@ -47,6 +48,9 @@ class StateModel:
         parameters = parameters_of_manifest(manifest, tables, options.compat)
         made = cls(tables, parameters, options).with_extras(manifest)
         if not manifest.substances:
+            if options.soiling:
+                fix = "load it with substances=['mud'], or --substances mud"
+                warn_user(f"soiling=True changes nothing in a scene without substances ({fix})", NoEffectWarning)
             return made
         insides = {o: entry.inside for o, entry in enumerate(manifest.objects) if entry.inside is not None}
         return made.with_substances(manifest.substances, insides)

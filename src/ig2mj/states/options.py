@@ -16,6 +16,10 @@ CONTROL_TIMESTEP = 1 / 30
 """Seconds. iGibson's step: states are updated once per rendered frame (simulator.py)."""
 
 
+class NoEffectWarning(UserWarning):
+    """An option changes nothing in this scene."""
+
+
 @dataclasses.dataclass(frozen=True)
 class StateOptions:
     """Choices, fixed for a run.
@@ -30,7 +34,7 @@ class StateOptions:
       contact_heat_rate: 1/s, rate at which two touching objects with temperatures approach each other. Beyond
         iGibson, where heat passes from sources only; 0 is off.
       soiling: what touches something that is covered with a substance is covered with it, too, and robots carry it
-        on under feet and wheels. Beyond iGibson.
+        on under feet and wheels. Beyond iGibson. In a scene without substances it changes nothing, with a warning.
       occlusion: `in_fov_of_agent` asks for an unobstructed line of sight, not only for the view frustum.
       image_aspect: width over height of the agent's camera image.
     """
