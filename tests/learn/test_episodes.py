@@ -10,7 +10,7 @@ import pytest
 from ig2mj.envs.experts import expert_of
 from ig2mj.envs.rollout import play
 from ig2mj.errors import EngineError, InputError, PolicyServerError, UnknownNameError
-from ig2mj.learn.axes import AxisResult, axis_environment, evaluate_axes
+from ig2mj.learn.axes import AxisResult, evaluate_axes
 from ig2mj.learn.episode_draws import OF_AXIS, SETS, EpisodeDraws
 from ig2mj.learn.episodes import (
     AXES,
@@ -22,6 +22,7 @@ from ig2mj.learn.episodes import (
     parse_axes,
     shipped_episodes,
 )
+from ig2mj.learn.stages import stages
 
 
 def test_names_of_axes_are_checked():
@@ -99,9 +100,9 @@ def test_the_values_of_a_file_are_played_whatever_the_seeds_say():
     made = make_episodes("GraspingBook", 2)
     draws = dataclasses.replace(made.draws, arrays={**made.draws.arrays, "noise": np.array([0.25, 0.5], np.float16)})
     own = dataclasses.replace(made, draws=draws, seeds=(1, 2))
-    (part,) = own.parts("all", 2)
-    env = axis_environment(own, "all", part, {"worlds": 2, "engine": "native", "observations": "proprioception"})
-    state = own.start(env, "all", part, [0, 1])
+    (stage,) = stages(own, ["all"], 2)
+    env = stage.environment({"worlds": 2, "engine": "native", "observations": "proprioception"})
+    state = stage.start(env, "all", [0, 1])
     np.testing.assert_allclose(np.asarray(state.draw.noise), [0.25, 0.5])
     names = [env.scene.object_names[int(row[0])] for row in np.asarray(state.draw.models)]
     entries = {entry.name: f"{entry.category}/{entry.model}" for entry in env.scene.manifest.objects}
@@ -113,7 +114,7 @@ def test_the_values_of_a_file_are_played_whatever_the_seeds_say():
     number = [env.scene.object_index(name) for name in names]
     np.testing.assert_allclose(own_mass[[0, 1], book], draws.arrays["mass"][[0, 1], number].astype(float), rtol=2e-3)
     played = evaluate_axes(own, ["object_poses", "homes"], 2, _expert, {"worlds": 2, "engine": "native"})
-    assert [result.success for result in played] == [[True, True], [True, True]]
+    assert [result.success for result in played.results] == [[True, True], [True, True]]
 
 
 def _expert(env):

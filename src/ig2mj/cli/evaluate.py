@@ -67,7 +67,7 @@ def run(
       stochastic: sample actions from the policy's distribution, as in training, instead of taking its mode.
       jobs: number of processes, each with its own worlds (the native engine uses all processors in any case).
       cluster: run on a Ray cluster: its address, or auto.
-      out: file for the JSON result; needed for --resume.
+      out: file for the JSON result, with --axes of the axes that are finished; needed for --resume.
       resume: continue an interrupted evaluation.
       task: the policy's task, if it is defined in a file of yours; this imports the file.
       axes: play fixed episodes (`ig2mj episodes`) in which this varies, next to those in which nothing does: names of
@@ -104,8 +104,8 @@ def run(
     if policy is not None or axes is not None:
         from ig2mj.cli.common.fixed_episodes import Request, evaluate_policy, evaluate_server
 
-        where = Request(axes, episodes, episode_file, page, out, json, engine, worlds, robot, grasping)
-        refused = {"--jobs": jobs != 1, "--cluster": cluster is not None, "--resume": resume, "--object": bool(object)}
+        where = Request(axes, episodes, episode_file, page, out, json, engine, worlds, robot, grasping, resume)
+        refused = {"--jobs": jobs != 1, "--cluster": cluster is not None, "--object": bool(object)}
         refused |= {"--pool-size": pool_size != 0, "--split": split != "held_out"}
         for option, given in refused.items():
             if given:

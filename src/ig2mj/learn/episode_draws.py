@@ -1,7 +1,7 @@
 """Values that were drawn for the episodes of a file, so that they stay when the code that draws changes.
 
     values = EpisodeDraws.drawn(environments, episodes)
-    state = values.start(env, "lights", [0, 1], seeds)
+    state = values.start(env, rows, numbers, seeds, ["lights"])
 
 Of each episode: the models of the task's objects, lights, cameras, the strength of noise, the wording, and where each
 robot starts. Factors of objects and materials (`Randomization.values`) come in `SETS` sets, of which episode k has set
@@ -21,6 +21,8 @@ import numpy as np
 
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import EngineError
+from ig2mj.worlds.draw import Draw
+from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import episode_keys
 
 SETS = 64
@@ -67,28 +69,53 @@ class EpisodeDraws:
             found["robot_start"] = self.robots[robot][rows].astype(np.float32)
         return found
 
-    def start(self, env: Environment, rows: Sequence[int], numbers: Sequence[int], seeds: Sequence[int]) -> EnvState:
+    def start(
+        self,
+        env: Environment,
+        rows: Sequence[int],
+        numbers: Sequence[int],
+        seeds: Sequence[int],
+        axes: Sequence[str],
+    ) -> EnvState:
         """All worlds of an environment at the start of these episodes.
 
         Args:
-          env: with the axes that vary. rows: of its pool. numbers: of the episodes. seeds: theirs, for what is drawn
-            in the course of an episode.
+          env: with the axes that vary; others of its axes are as the scene has them. rows: of its pool. numbers: of
+            the episodes. seeds: theirs, for what is drawn in the course of an episode. axes: those that vary.
 
         Raises:
-          EngineError: the file lacks a model of the environment's, or the other way round.
+          EngineError: the file lacks a model of the environment's, or the other way round, or values of an axis.
         """
-        starts, randomize = env.core.starts, env.config.randomize
-        if randomize is None or not self.arrays:  # of files without values everything follows from the seeds
+        if env.config.randomize is None or not self.arrays:  # without values everything follows from the seeds
             return env.start_from(np.asarray(rows), list(seeds))
-        values = self.values(randomize.axes, numbers, env.robot)
-        if "robot_start" in randomize.axes and "robot_start" not in values:  # a robot that the file does not know
+        made, draw = self.made(env, rows, numbers, seeds, axes)
+        return env.start_with(made, draw, np.asarray(rows), list(seeds))
+
+    def made(
+        self,
+        env: Environment,
+        rows: Sequence[int],
+        numbers: Sequence[int],
+        seeds: Sequence[int],
+        axes: Sequence[str],
+    ) -> tuple[Pool, Draw]:
+        """States at the start of these episodes, and what was drawn for them; arguments and errors as of `start`."""
+        starts, randomize = env.core.starts, env.config.randomize
+        assert randomize is not None
+        varied = [axis for axis in randomize.axes if axis in axes]
+        for axis in varied:
+            if lacking := [name for name in OF_AXIS.get(axis, ()) if name not in self.arrays]:
+                raise EngineError(f"the file has no values of {', '.join(lacking)} for the axis {axis}")
+        values = self.values(varied, numbers, env.robot)
+        if "robot_start" in varied and "robot_start" not in values:  # a robot that the file does not know
             zero = np.zeros(len(rows), np.int32)
             choice = starts.choices(np.asarray(rows, np.int32), episode_keys(np.array(seeds, np.int32), zero, zero))
             assert starts.robot_starts is not None and choice.robot_start is not None
             values["robot_start"] = starts.robot_starts.offsets[np.asarray(choice.robot_start)]
-        models = self._choices(env, numbers) if "objects" in randomize.axes else None
-        made, draw = starts.with_values(np.asarray(rows, np.int32), values, models)
-        return env.start_with(made, draw, np.asarray(rows), list(seeds))
+        usual = starts.randomization.neutral(len(rows))
+        values |= {name: _as_wide(array, usual[name]) for name, array in values.items() if name in FACTORS}
+        models = self._choices(env, numbers) if "objects" in varied else None
+        return starts.with_values(np.asarray(rows, np.int32), values, models)
 
     def _choices(self, env: Environment, numbers: Sequence[int]) -> np.ndarray:
         known = model_names(env)
@@ -135,6 +162,15 @@ class EpisodeDraws:
                 known = model_names(env)
                 models = [list(known[int(k)]) for k in np.asarray(choice.models)]
         return cls(arrays, robots, models)
+
+
+def _as_wide(values: np.ndarray, usual: np.ndarray) -> np.ndarray:
+    """Factors of the objects or materials that an environment has. A file has those of the home with all models and
+    its first robot; environments have fewer models, whose objects and materials come behind the home's and before the
+    robot's, which have no factor. `usual`: of the environment, where the file has none."""
+    found, known = usual.copy(), min(values.shape[1], usual.shape[1])
+    found[:, :known] = values[:, :known]
+    return found
 
 
 def model_names(env: Environment) -> list[tuple[str, ...]]:

@@ -154,11 +154,17 @@ class Episodes:
             pool = self.poses
         return {"pool": pool, **({"randomize": settings} if settings else {})}
 
-    def start(self, env: Environment, axis: str, part: EpisodePart, rows: Sequence[int]) -> EnvState:
-        """The state at the start of episodes: rows of a part, each in one world of an environment made for it."""
+    def start(self, env: Environment, axis: str, part: EpisodePart, rows: Sequence[int], behind: int = 0) -> EnvState:
+        """The state at the start of episodes: rows of a part, each in one world of an environment in which the axis
+        varies. What else varies there is as the scene has it.
+
+        Args:
+          behind: rows of the environment's pool before those of the axis.
+        """
         numbers = [part.numbers[int(row) % len(part.numbers)] for row in rows]
         rows = [int(row) % len(part.numbers) for row in rows] if part.home is not None else numbers
-        return self.draws.start(env, rows, numbers, [self.seeds[number] for number in numbers])
+        seeds = [self.seeds[number] for number in numbers]
+        return self.draws.start(env, [behind + row for row in rows], numbers, seeds, tuple(self.axes[axis]))
 
     def described_draws(self, axis: str, number: int, robot: str, names: Sequence[str]) -> dict[str, Any]:
         """What was drawn for an episode, for people. `names`: of the scene's objects."""

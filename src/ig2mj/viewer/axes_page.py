@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from ig2mj.envs.environment import Environment
+from ig2mj.envs.rollout import Act
 from ig2mj.envs.state import EnvState
 from ig2mj.errors import Ig2mjError
 from ig2mj.install_hint import require_extras
-from ig2mj.learn.axes import ActOf, AxisResult, axis_environment
+from ig2mj.learn.axes import ActOf, AxisResult
 from ig2mj.learn.episodes import Episodes
+from ig2mj.learn.stages import Stage, stages
 
 STRIPS, FRAMES = 2, 6
 """Failures of each axis that are shown, and images of each."""
@@ -43,14 +46,15 @@ def write_page(
     require_extras("demo")
     rows = [f"<h1>{html.escape(title)}</h1>", f'<img src="{_plot(results)}" alt="success and q by axis">']
     rows.append(_table(results))
+    replays = _Replays(episodes, results, act_of, options)
     for result in results:
-        for number in result.failures[:STRIPS]:
+        for number, q in result.failures[:STRIPS]:
             try:
-                strip = _strip(episodes, result.axis, number, act_of, options)
+                strip = replays.strip(result.axis, number)
             except Ig2mjError as e:  # nothing renders here, or a policy server has gone
                 rows.append(f"<p>{html.escape(result.axis)}, episode {number}: {html.escape(str(e))}</p>")
                 continue
-            rows.append(f"<h3>{html.escape(result.axis)}, episode {number}: no success, q {result.q[number]:.2f}</h3>")
+            rows.append(f"<h3>{html.escape(result.axis)}, episode {number}: no success, q {q:.2f}</h3>")
             rows.append(f'<img src="{strip}" alt="images from start to end of the episode">')
     head = f'<!doctype html><meta charset="utf-8"><title>{html.escape(title)}</title><style>{STYLE}</style>'
     file.write_text(head + "\n".join(rows) + "\n", encoding="utf-8")
@@ -92,22 +96,38 @@ def _plot(results: Sequence[AxisResult]) -> str:
         return _embedded(out.getvalue())
 
 
-def _strip(episodes: Episodes, axis: str, number: int, act_of: ActOf, options: Mapping[str, Any]) -> str:
-    """Images of one episode, from its start to its end."""
-    from PIL import Image
+class _Replays:
+    """Episodes that are played again in one world of the native engine. Axes share environments as when they were
+    judged."""
 
-    part = next(one for one in episodes.parts(axis, number + 1) if number in one.numbers)
-    env = axis_environment(episodes, axis, part, {**options, "worlds": 1, "engine": "native"})
-    act = act_of(env)
-    state = episodes.start(env, axis, part, [part.numbers.index(number)])
-    images = [_image(env, state)]
-    while not bool(np.asarray(state.done)[0]):
-        state = env.step(state, act(state))
-        images.append(_image(env, state) if len(images) % 5 == 0 or bool(np.asarray(state.done)[0]) else images[-1])
-    picked = [images[k] for k in np.linspace(0, len(images) - 1, FRAMES).round().astype(int)]
-    with io.BytesIO() as out:
-        Image.fromarray(np.concatenate(picked, axis=1)).save(out, format="png")
-        return _embedded(out.getvalue())
+    def __init__(self, episodes: Episodes, results: Sequence[AxisResult], act_of: ActOf, options: Mapping[str, Any]):
+        axes = [result.axis for result in results]
+        self._stages = stages(episodes, axes, episodes.count, options.get("robot"))
+        self._act_of, self._options = act_of, {**options, "worlds": 1, "engine": "native"}
+        self._made: dict[int, tuple[Environment, Act]] = {}
+
+    def strip(self, axis: str, number: int) -> str:
+        """Images of one episode, from its start to its end."""
+        from PIL import Image
+
+        stage, env, act = self._playing(axis, number)
+        state = stage.start(env, axis, [stage.part.numbers.index(number)])
+        images = [_image(env, state)]
+        while not bool(np.asarray(state.done)[0]):
+            state = env.step(state, act(state))
+            images.append(_image(env, state) if len(images) % 5 == 0 or bool(np.asarray(state.done)[0]) else images[-1])
+        picked = [images[k] for k in np.linspace(0, len(images) - 1, FRAMES).round().astype(int)]
+        with io.BytesIO() as out:
+            Image.fromarray(np.concatenate(picked, axis=1)).save(out, format="png")
+            return _embedded(out.getvalue())
+
+    def _playing(self, axis: str, number: int) -> tuple[Stage, Environment, Act]:
+        """What plays an episode; made once."""
+        which = next(k for k, s in enumerate(self._stages) if axis in s.axes and number in s.part.numbers)
+        if which not in self._made:
+            env = self._stages[which].environment(self._options)
+            self._made[which] = env, self._act_of(env)
+        return self._stages[which], *self._made[which]
 
 
 def _image(env: Any, state: EnvState) -> np.ndarray:

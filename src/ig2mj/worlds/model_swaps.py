@@ -108,7 +108,7 @@ class ModelSwaps:
 
     def models(self, choice: Int[Array, "W"]) -> Int[Array, "W R"]:
         """Objects that have the roles."""
-        return jnp.asarray(self._other, jnp.int32)[choice]
+        return namespace(choice).asarray(self._other, np.int32)[choice]
 
     def lowest(self, floor: Float[np.ndarray, "O"]) -> Float[np.ndarray, "O"]:
         """Heights below which objects have left the house, where those of a role wait in each other's places."""

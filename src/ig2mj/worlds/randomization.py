@@ -22,6 +22,7 @@ from jaxtyping import Float, Int, UInt
 
 from ig2mj.engine.model_fields import MASSES, ModelFields, with_masses
 from ig2mj.engine.view import Array
+from ig2mj.geometry.poses import namespace
 from ig2mj.scene.tables import SceneTables
 from ig2mj.worlds.draw import SPARE_LIGHTS, Draw
 from ig2mj.worlds.randomize import Randomize, Range
@@ -35,6 +36,9 @@ VARIANT_SEED = 20_000_003
 
 STREAMS = {"mass": 0x6D617373, "friction": 0x66726963, "damping": 0x64616D70}
 """Folded into an episode's key, one for each quantity; those that are not here take the checksum of their name."""
+
+
+NO_TURN = np.array([1.0, 0.0, 0.0, 0.0], np.float32)
 
 
 class Randomization:
@@ -68,10 +72,7 @@ class Randomization:
         """Of worlds with these values, those of `values` or from a file. On the host."""
         found = {}
         if self.physics is not None:
-            factor = np.asarray(values["mass"], float)
-            of_body = np.where(self._mass_owner >= 0, factor[:, np.maximum(self._mass_owner, 0)], 1.0)
-            masses = with_masses(self._model, self._model.body_mass * of_body)
-            found |= {name: getattr(masses, name) for name in MASSES} | self._contact_fields(values)
+            found |= self._mass_fields(np.asarray(values["mass"], float)) | self._contact_fields(values)
         if self.materials is not None:
             found |= self._material_fields(values)
         return ModelFields(**found)
@@ -90,6 +91,30 @@ class Randomization:
             found["material_colour"] = factors(key, "material_colour", self.materials.colour, (len(self._mat_rgba), 3))
             exchanged = uniform(key, "exchanged", (objects + 1,)) < self.materials.textures
             found["exchanged"] = jnp.where(exchanged, uniform(key, "material", (objects + 1,)), -1.0)
+        return found
+
+    def neutral(self, worlds: int) -> dict[str, np.ndarray]:
+        """Values, those of `values` and of `Draw`, with which worlds are as the scene has them, of the axes that are
+        on."""
+        found: dict[str, np.ndarray] = {}
+        objects, one = self._objects, np.ones
+        if self.physics is not None:
+            found |= {name: one((worlds, objects), np.float32) for name in ("mass", "friction", "damping")}
+        if self.materials is not None:
+            found["object_colour"] = one((worlds, objects + 1, 3), np.float32)
+            found["material_colour"] = one((worlds, len(self._mat_rgba), 3), np.float32)
+            found["exchanged"] = np.full((worlds, objects + 1), -1.0, np.float32)
+        if self.lights is not None:
+            found["light_colour"] = one((worlds, 1 + self._lights + SPARE_LIGHTS, 3), np.float32)
+            found["light_colour"][:, 1 + self._lights :] = 0.0  # the spare ones are off
+            found["light_quat"] = np.tile(NO_TURN, (worlds, 1 + self._lights + SPARE_LIGHTS, 1))
+        if self.camera is not None:
+            found |= {"camera_pos": np.zeros((worlds, 3), np.float32), "camera_quat": np.tile(NO_TURN, (worlds, 1))}
+            found["camera_slope"] = one(worlds, np.float32)
+        if self.noise is not None:
+            found["noise"] = np.zeros(worlds, np.float32)
+        if self.instructions is not None:
+            found["instruction"] = np.zeros(worlds, np.int32)
         return found
 
     def used(self) -> dict[str, np.ndarray]:
@@ -136,6 +161,13 @@ class Randomization:
         factor = np.where(owner >= 0, self._mass_factors[:, np.maximum(owner, 0)], 1.0)
         self._masses = with_masses(model, model.body_mass * factor)
 
+    def _mass_fields(self, factors: Float[np.ndarray, "W O"]) -> dict[str, np.ndarray]:
+        """Masses of worlds with these factors; those of equal worlds are derived once, which takes milliseconds."""
+        different, which = np.unique(factors, axis=0, return_inverse=True)
+        of_body = np.where(self._mass_owner >= 0, different[:, np.maximum(self._mass_owner, 0)], 1.0)
+        masses = with_masses(self._model, self._model.body_mass * of_body)
+        return {name: getattr(masses, name)[which.ravel()] for name in MASSES}
+
     def _contact_fields(self, values: Mapping[str, Array]) -> dict[str, Array]:
         friction = _of_owner(values["friction"], self._geom_object)
         damping = _of_owner(values["damping"], self._dof_object)
@@ -156,22 +188,22 @@ class Randomization:
         self._kinds = [np.flatnonzero([kind == one for kind in kinds]) for one in dict.fromkeys(filter(None, kinds))]
 
     def _material_fields(self, values: Mapping[str, Array]) -> dict[str, Array]:
-        of_object, colour = self._look_object, jnp.asarray(values["object_colour"])
-        own = jnp.where((of_object >= 0)[:, None], colour[:, of_object], 1.0)
-        own = jnp.concatenate([own, jnp.ones_like(own[..., :1])], axis=-1)
+        of_object, colour, share = self._look_object, values["object_colour"], values["exchanged"]
+        xp = namespace(colour, share, values["material_colour"])
+        own = xp.where((of_object >= 0)[:, None], colour[:, of_object], np.float32(1.0))
+        own = xp.concatenate([own, xp.ones_like(own[..., :1])], axis=-1)
         plain = (self._rgba == UNCOLOURED).all(1)  # what a material colours
-        rgba = jnp.where(plain[:, None], self._rgba, jnp.clip(self._rgba * own, 0.0, 1.0))
-        shade = jnp.where(self._of_home[:, None], jnp.asarray(values["material_colour"]), 1.0)
-        shade = jnp.concatenate([shade, jnp.ones_like(shade[..., :1])], axis=-1)
-        share, material = jnp.asarray(values["exchanged"]), jnp.asarray(self._material)
-        found = jnp.broadcast_to(material, (share.shape[0], len(self._material)))
+        rgba = xp.where(plain[:, None], self._rgba, xp.clip(self._rgba * own, 0.0, 1.0))
+        shade = xp.where(self._of_home[:, None], values["material_colour"], np.float32(1.0))
+        shade = xp.concatenate([shade, xp.ones_like(shade[..., :1])], axis=-1)
+        found = xp.broadcast_to(self._material, (share.shape[0], len(self._material)))
         for kind in self._kinds:
-            number = jnp.clip((share * len(kind)).astype(jnp.int32), 0, len(kind) - 1)
-            other = jnp.asarray(kind, jnp.int32)[number][:, of_object]
+            number = xp.clip((share * len(kind)).astype(np.int32), 0, len(kind) - 1)
+            other = xp.asarray(kind, np.int32)[number][:, of_object]
             replaced = (share >= 0)[:, of_object] & np.isin(self._material, kind) & (of_object >= 0)
-            found = jnp.where(replaced, other, found)
-        mat_rgba = jnp.clip(self._mat_rgba * shade, 0.0, 1.0)
-        return {"geom_rgba": rgba, "mat_rgba": mat_rgba, "geom_matid": found.astype(jnp.int32)}
+            found = xp.where(replaced, other, found)
+        mat_rgba = xp.clip(self._mat_rgba * shade, 0.0, 1.0)
+        return {"geom_rgba": rgba, "mat_rgba": mat_rgba, "geom_matid": found.astype(np.int32)}
 
     # Light and cameras.
 
@@ -260,4 +292,6 @@ def _wholes(tables: SceneTables) -> np.ndarray:
 
 def _of_owner(of_object: Array, owner: np.ndarray) -> Float[Array, "W n"]:
     """A factor for each entry of a field: its object's; 1 where `owner` is -1."""
-    return jnp.where(owner >= 0, jnp.asarray(of_object)[:, np.maximum(owner, 0)], 1.0).astype(jnp.float32)
+    return (
+        namespace(of_object).where(owner >= 0, of_object[:, np.maximum(owner, 0)], np.float32(1.0)).astype(np.float32)
+    )

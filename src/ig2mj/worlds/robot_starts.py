@@ -26,6 +26,7 @@ from ig2mj.engine.model_fields import ModelFields, merged
 from ig2mj.engine.snapshot import AgentsPart
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
+from ig2mj.geometry.poses import namespace
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.randomization import pick
@@ -133,7 +134,7 @@ class RobotStarts:
         qpos, ctrl, pos, quat = tables
 
         def spread(array: Array) -> Array:
-            return jnp.broadcast_to(jnp.asarray(array), (qpos.shape[0], *np.shape(array)))
+            return namespace(qpos).broadcast_to(array, (qpos.shape[0], *np.shape(array)))
 
         agents = dataclasses.replace(jax.tree.map(spread, self._start), qpos=qpos, ctrl=ctrl)
         fields = physics.model_fields
@@ -240,9 +241,10 @@ class RobotStarts:
         """qpos, ctrl of the agents' part, body_pos and body_quat with each offset, [n, ...]."""
         tables = []
         for offset in offsets:
-            qpos, ctrl = np.array(start.qpos, np.float32), np.array(start.ctrl, np.float32)
+            qpos, ctrl = np.array(start.qpos), np.array(start.ctrl)
             pos, quat = np.array(self._model.body_pos, np.float32), np.array(self._model.body_quat, np.float32)
-            for root, (there, faces, ball) in zip(self._roots, self._placed(offset), strict=True):
+            elsewhere = zip(self._roots, self._placed(offset), strict=True) if np.any(offset) else ()
+            for root, (there, faces, ball) in elsewhere:  # the usual start keeps its last digits
                 if root.qpos < 0:
                     pos[root.body], quat[root.body] = there, faces
                     continue

@@ -21,6 +21,7 @@ from ig2mj.engine.model_fields import ModelFields, merged
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import ActionError, EngineError
+from ig2mj.process.gc_pause import Compiled
 from ig2mj.worlds import guards
 from ig2mj.worlds.draw import Draw
 from ig2mj.worlds.model_swaps import ModelSwaps
@@ -152,23 +153,32 @@ class Starts:
         """Rows of the pool with values that were drawn elsewhere. On the host.
 
         Args:
-          values: those of `Randomization.values` and of `Draw`, of the axes that are on.
+          values: those of `Randomization.values` and of `Draw`. Axes that are on and have none are as the scene has
+            them (`Randomization.neutral`, and the robot's usual start).
           models: numbers of the choices.
         """
+        values = {**self.randomization.neutral(len(row)), **values}
         fields = self.randomization.fields_of(values)
         rows = self.bare_rows(row)
         rows = dataclasses.replace(rows, physics=dataclasses.replace(rows.physics, model_fields=fields))
         named = {f.name for f in dataclasses.fields(Draw)} & values.keys()
-        draw = self._usual(Draw(**{name: jnp.asarray(values[name]) for name in named}), len(row))
+        draw = self._usual(Draw(**{name: values[name] for name in named}), len(row))
         if models is not None:
             assert self._swaps is not None
-            rows = self._swaps.swapped(rows, jnp.asarray(models))
-            draw = dataclasses.replace(draw, models=self._swaps.models(jnp.asarray(models)))
+            rows = self._swapped(rows, models)
+            draw = dataclasses.replace(draw, models=self._swaps.models(models))
         if self.robot_starts is not None:
-            offsets = np.asarray(values["robot_start"], np.float32)
+            usual = np.zeros((len(row), 3), np.float32)
+            offsets = np.asarray(values.get("robot_start", usual), np.float32)
             rows = self.robot_starts.moved_by(rows, offsets)
-            draw = dataclasses.replace(draw, robot_start=jnp.asarray(offsets))
+            draw = dataclasses.replace(draw, robot_start=offsets)
         return rows, draw
+
+    @functools.cached_property
+    def _swapped(self) -> Compiled:
+        """`ModelSwaps.swapped` as one program."""
+        assert self._swaps is not None
+        return Compiled(self._swaps.swapped)
 
     @functools.cached_property
     def _fits(self) -> Bool[np.ndarray, "P K"]:
@@ -216,13 +226,13 @@ class Starts:
 
     def _usual(self, draw: Draw, worlds: int) -> Draw:
         """With the first choice of everything that is chosen from tables."""
-        zero = jnp.zeros(worlds, jnp.int32)
+        zero = np.zeros(worlds, np.int32)
         if self._swaps is not None:
             draw = dataclasses.replace(draw, models=self._swaps.models(zero))
         if self._poses is not None:
             draw = dataclasses.replace(draw, object_poses=zero)
         if self.robot_starts is not None:
-            draw = dataclasses.replace(draw, robot_start=jnp.zeros((worlds, 3), jnp.float32))
+            draw = dataclasses.replace(draw, robot_start=np.zeros((worlds, 3), np.float32))
         return draw
 
     @functools.cached_property

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import pathlib
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ig2mj.cli.common.jobs import opened, where_of
 from ig2mj.errors import InputError
 from ig2mj.learn.axes import ActOf, AxisResult, evaluate_axes, result_of
-from ig2mj.learn.episodes import ALL, COUNT, Episodes, find_episodes, parse_axes
+from ig2mj.learn.episodes import ALL, COUNT, NOMINAL, Episodes, find_episodes, parse_axes
 
 
 def chosen_episodes(task: str, given: pathlib.Path | None) -> Episodes:
@@ -31,6 +34,17 @@ def check_episodes(axes: str, count: int | None, episodes: Episodes) -> tuple[tu
     return names, min(requested, episodes.count)
 
 
+@dataclasses.dataclass(frozen=True)
+class Output:
+    """Where results go. Attributes: json: they are printed as JSON. out: file for JSON, of finished axes while others
+    are played. page: file for a page. resume: an interrupted evaluation with the same `out` goes on."""
+
+    json: bool = False
+    out: pathlib.Path | None = None
+    page: pathlib.Path | None = None
+    resume: bool = False
+
+
 def play_axes(
     title: str,
     episodes: Episodes,
@@ -38,41 +52,71 @@ def play_axes(
     count: int,
     act_of: ActOf,
     options: Mapping[str, Any],
-    *,
-    json: bool,
-    out: pathlib.Path | None,
-    page: pathlib.Path | None,
+    output: Output,
     about: Mapping[str, Any],
 ) -> int:
-    """Plays, prints and writes. Returns the exit status: 1 where a policy server ended it before the last episode."""
+    """Plays, prints and writes. Returns the exit status: 1 where a policy server ended it before the last episode.
+
+    Raises:
+      KeyboardInterrupt: after Ctrl-C, once what was measured so far is printed. InputError: an evaluation with the same
+        output was interrupted and is not to go on, or had other settings. ClusterError: one is under way.
+    """
     import json as form
 
     from ig2mj.process.progress import progress
 
-    with progress(f"evaluating {title}") as report:
-        results = evaluate_axes(episodes, axes, count, act_of, options, report)
-    found = {**about, "episode_file": episodes.header["hash"], **result_of(results)}
-    error = results[-1].error
-    if error is not None:
-        found["error"] = str(error)
-        print(f"error: {error}", file=sys.stderr)
-    if out is not None:
-        out.write_text(form.dumps(found) + "\n", encoding="utf-8")
-    if page is not None:
+    known = {**about, "episode_file": episodes.header["hash"]}
+
+    def write(found: Mapping[str, Any]) -> None:
+        if output.out is not None:
+            output.out.write_text(form.dumps({**known, **found}) + "\n", encoding="utf-8")
+
+    def finished(results: Sequence[AxisResult]) -> None:
+        of = result_of(results)
+        write({**of, "unfinished": [axis for axis in axes if axis not in of["axes"]]})
+
+    with contextlib.ExitStack() as stack:
+        journal = None
+        if output.out is not None:
+            settings = {name: _plain(value) for name, value in options.items()}
+            request = {"command": "evaluate --axes", "axes": list(axes), "episodes": count, **known, **settings}
+            journal = stack.enter_context(opened(output.out, request, where_of(1, None, output.resume)))
+        with progress(f"evaluating {title}") as report:
+            done = evaluate_axes(episodes, axes, count, act_of, options, report, journal, finished)
+        if journal is not None and not done.interrupted and done.error is None:
+            journal.finish()
+    found = result_of(done.results)
+    if done.error is not None:
+        found["error"] = str(done.error)
+        print(f"error: {done.error}", file=sys.stderr)
+    if not done.interrupted:
+        write(found)
+    if output.page is not None and not done.interrupted:
         from ig2mj.viewer.axes_page import write_page
 
-        write_page(page, title, episodes, results, act_of, options)
-    if json:
-        print(form.dumps(found))
+        write_page(output.page, title, episodes, done.results, act_of, options)
+    if output.json:
+        print(form.dumps({**known, **found}))
     else:
-        _print(title, results)
-    return 1 if error is not None else 0
+        _print(title, done.results)
+    if done.interrupted:
+        again = "the same command with --resume continues" if output.out else "--out FILE would keep them for --resume"
+        print(f"{sum(len(r.success) for r in done.results)} episodes are over; {again}", file=sys.stderr)
+        raise KeyboardInterrupt
+    return 1 if done.error is not None else 0
+
+
+def _plain(value: Any) -> Any:
+    """A setting for the request of a journal."""
+    if isinstance(value, str | int | float | bool | None):
+        return value
+    return [_plain(one) for one in value] if isinstance(value, list | tuple) else str(value)
 
 
 def _print(title: str, results: Sequence[AxisResult]) -> None:
     from ig2mj.cli.common.printing import make_table, stdout_console
 
-    nominal = results[0].as_dict()["success_rate"]
+    nominal = next((r.as_dict()["success_rate"] for r in results if r.axis == NOMINAL), None)
     rows = []
     for result in results:
         found = result.as_dict()

@@ -9,7 +9,7 @@ from typing import Any
 import jax
 
 from ig2mj.agents.registry import find_robot
-from ig2mj.cli.common.axes import check_episodes, chosen_episodes, play_axes
+from ig2mj.cli.common.axes import Output, check_episodes, chosen_episodes, play_axes
 from ig2mj.cli.common.files import check_output
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.registry import find_task
@@ -35,6 +35,7 @@ class Request:
     worlds: int
     robot: str | None
     grasping: str | None
+    resume: bool = False
 
     def check(self) -> None:
         """Raises Ig2mjError: a number or a file is none."""
@@ -42,6 +43,8 @@ class Request:
             raise Ig2mjError(f"--episodes {self.episodes}: at least one episode")
         if self.worlds < 0:
             raise Ig2mjError(f"--worlds {self.worlds}: at least one world, or 0 for the usual number")
+        if self.resume and self.out is None:
+            raise Ig2mjError("--resume needs --out FILE: what is finished is stored next to it")
         for file in (self.out, self.page):
             if file is not None:
                 check_output(file)
@@ -90,7 +93,7 @@ def evaluate_policy(name: str, request: Request, stochastic: bool) -> int:
         return acting(policy, env, file, drawn=stochastic or None)
 
     about = {"env": depends["task"], "robot": depends["robot"], "agent": name, "weights": policy.weights_digest}
-    about |= {"engine": options["engine"], "worlds": options["worlds"]}
+    about |= {"engine": options["engine"], "worlds": options["worlds"], "drawn": stochastic}
     return _play(f"{name} on episodes of {depends['task']}", episodes, axes, count, act_of, options, request, about)
 
 
@@ -123,7 +126,7 @@ def evaluate_server(
             return RemoteActor(env, server, chunk)
 
         about = {"env": known.name, "robot": str(options["robot"]), "agent": address}
-        about |= {"engine": options["engine"], "worlds": options["worlds"]}
+        about |= {"engine": options["engine"], "worlds": options["worlds"], "chunk": chunk}
         return _play(f"{address} on {known.name}", episodes, axes, count, act_of, options, request, about)
     finally:
         server.close()
@@ -167,5 +170,5 @@ def _play(
     request: Request,
     about: dict[str, Any],
 ) -> int:
-    output = {"json": request.json, "out": request.out, "page": request.page}
-    return play_axes(title, episodes, axes, count, act_of, options, **output, about=about)
+    output = Output(request.json, request.out, request.page, request.resume)
+    return play_axes(title, episodes, axes, count, act_of, options, output, about)
