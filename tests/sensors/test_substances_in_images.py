@@ -21,7 +21,7 @@ from ig2mj.sensors.content_levels import levels
 from ig2mj.sensors.native_camera import NativeCamera
 from ig2mj.sensors.particle_slots import fill_slots, slot_kinds
 from ig2mj.sensors.slots import SUBSTANCE
-from ig2mj.sensors.substance_slots import PIECES
+from ig2mj.sensors.substance_slots import PIECES, PUFFS
 from ig2mj.states import initial_states
 from ig2mj.states.substances import coat, volume
 from ig2mj.worlds import Rules
@@ -100,6 +100,20 @@ def test_a_stream_ends_in_the_glass():
     assert pos[-1, 2] - size[-1, 2] < glass[2] + GLASS[2] < pos[0, 2] < 0.5 + JUG[2]
 
 
+@pytest.mark.parametrize(("celsius", "litres", "puffs"), [(70.0, 0.3, PUFFS), (50.0, 0.3, 0), (70.0, 0.0, 0)])
+def test_steam_rises_from_hot_water_only(celsius, litres, puffs):
+    states = _holding(MODEL, HOME, glass=litres)
+    glass = HOME.index["glass"]
+    states = dataclasses.replace(states, temperature=np.asarray(states.temperature).copy())
+    states.temperature[0, glass] = celsius
+    slots = fill_slots(MODEL, states, VIEW, 4)
+    shown = np.flatnonzero(np.asarray(slots.kind)[0] == SUBSTANCE)[int(litres > 0) :]  # the first is the level
+    assert len(shown) == puffs
+    pos, top = np.asarray(slots.pos)[0, shown], np.add(HOME.things[glass].pos, (0, 0, GLASS[2]))
+    assert (pos[:, 2] > top[2]).all() and (np.diff(pos[:, 2]) > 0).all()
+    assert np.abs(pos[:, :2] - top[:2]).max(initial=0.0) < GLASS[0]
+
+
 def test_scenes_without_substances_have_particles_only():
     plain = HandWorld(Item("box"))
     assert len(slot_kinds(plain.model(), 16)) == 16 and slot_kinds(MODEL, 0) == ()
@@ -121,12 +135,14 @@ def folder(tmp_path_factory):
     return made
 
 
-def _images(folder, name: str, litres: float):
+def _images(folder, name: str, litres: float, celsius: float = 23.0):
     scene = load_scene(folder)
     rules = Rules.of_scene(scene)
     engine = make_engine(name, scene, 1)
     physics = engine.reset()
     states = volume.set_volume(rules.model, rules.initial, scene.object_index("glass"), "water", litres)
+    heat = np.full(np.shape(states.temperature), celsius, np.float32)
+    states = dataclasses.replace(states, temperature=heat)
     kind = NativeCamera if name == "native" else BatchCamera
     camera = kind(engine, rules.model, ["above"], width=SIDE, height=SIDE, depth=True, segmentation=True, particles=4)
     call = camera if name == "native" else jax.jit(camera)
@@ -151,3 +167,13 @@ def test_images_of_both_renderers_show_the_level_of_a_glass(folder):
         assert np.abs(native.depth - warp.depth).mean() < 2e-3
     assert np.abs(found["warp"][0].rgb.astype(int) - found["warp"][1].rgb.astype(int)).mean() > 0.1
     assert POURED_JUG[0] < 0.15 - POURED_GLASS[0]  # the jug does not hide the glass
+
+
+def test_images_of_both_renderers_show_steam_over_hot_water(folder):
+    middle = (SIDE // 2, SIDE // 2)
+    found = [[_images(folder, name, 0.24, celsius) for celsius in (23.0, 80.0)] for name in ("native", "warp")]
+    for cold, hot in found:
+        assert hot.depth[0, 0][middle] < cold.depth[0, 0][middle] - 0.1
+        red, green, blue = hot.rgb[0, 0][middle].astype(int)
+        assert abs(red - blue) < 8 and abs(red - green) < 8  # grey, not the water's blue
+    assert np.abs(found[0][1].depth - found[1][1].depth).mean() < 2e-3

@@ -4,12 +4,14 @@
 |---|---|
 | surfaces of contents (`ig2mj.sensors.content_levels`) | containers |
 | pieces of the streams that leave containers | `PIECES` for each of `streams.MOST` streams |
+| puffs of steam over hot liquids | `PUFFS` for each of `STEAMING` containers |
 | spots on what is covered, puddles among them | particles that the camera shows |
 | tongues of flames | `TONGUES` for each of `FIRES` objects on fire |
 
-Scenes without substances have none of the first three, and scenes without fire none of the last.
+Scenes without substances have none of the first four, and scenes without fire none of the last.
 
-Axes: W worlds, S slots, C containers, K streams, D objects that can be covered, U substances, O objects.
+Axes: W worlds, S slots, C containers, K streams, M containers that steam, D objects that can be covered, U substances,
+O objects.
 """
 
 from __future__ import annotations
@@ -54,6 +56,16 @@ FIRES, TONGUES = 4, 14
 FLAME_HEIGHT, FLAME_RADIUS = 0.2, 0.032
 """m to which tongues rise, and half the width of one at the bottom."""
 
+STEAMS = 60.0
+"""Degrees Celsius from which steam rises."""
+
+STEAMING, PUFFS = 4, 5
+"""Containers whose steam is shown, and puffs of each."""
+
+STEAM_HEIGHT, STEAM_RADIUS, STEAM_ASIDE, STEAM_COLOUR = 0.18, (0.008, 0.02), 0.012, 0.92
+"""m to which puffs rise, their radii below and above, m by which they are aside, and their grey: cameras show them
+opaque, so that they are small and apart."""
+
 ELLIPSOID, BOX = mujoco.mjtGeom.mjGEOM_ELLIPSOID, mujoco.mjtGeom.mjGEOM_BOX
 
 
@@ -62,7 +74,7 @@ def shape_kinds(model: StateModel, particles: int) -> tuple[mujoco.mjtGeom, ...]
     kinds = list[mujoco.mjtGeom]()
     if particles and model.substances is not None:
         kinds += [BOX if flat else ELLIPSOID for flat in rectangles(model)]
-        kinds += [ELLIPSOID] * (MOST * PIECES * _has_streams(model) + particles)
+        kinds += [ELLIPSOID] * ((MOST * PIECES + STEAMING * PUFFS) * _has_streams(model) + particles)
     if particles and _can_burn(model):
         kinds += [ELLIPSOID] * (FIRES * TONGUES)
     return tuple(kinds)
@@ -77,6 +89,7 @@ def shapes(model: StateModel, states: ExtendedStates, view: PhysicsView, particl
         found.append(_slots(SUBSTANCE, surface.there, surface.pos, surface.axes, surface.half, surface.rgb, owner))
         if _has_streams(model):
             found.append(_streams(model, states, view, surface.pos[..., 2], surface.there))
+            found.append(_steam(model, states, view))
         found.append(_spots(model, states, view, particles))
     if particles and _can_burn(model):
         found.append(_flames(states, view))
@@ -181,6 +194,33 @@ def _spots(model: StateModel, states: ExtendedStates, view: PhysicsView, count: 
         size=jnp.stack([radius, radius, jnp.full_like(radius, SPOT_THICKNESS)], axis=-1),
         colour=jnp.asarray(_colours(found))[column],
         owner=jnp.asarray(found.covered, jnp.int32)[row],
+    )
+
+
+def _steam(model: StateModel, states: ExtendedStates, view: PhysicsView) -> Slots:
+    """Puffs over the openings of the first containers with hot liquids."""
+    found = of(model)
+    liquid = np.array([s.kind == "liquid" for s in found.substances], bool)
+    amount = jnp.sum(jnp.where(liquid, jnp.asarray(states.volume), 0.0), axis=-1)  # [W, C]
+    steams = (amount >= volume.CONTAINS) & (jnp.asarray(states.temperature)[:, found.containers.object] > STEAMS)
+    rank = jnp.cumsum(steams, axis=1) - 1
+    first = steams[:, None] & (rank[:, None] == np.arange(STEAMING)[:, None])  # [W, M, C]
+    centre = jnp.stack(found.containers.openings(view).centre, axis=-1)  # [W, C, 3]
+    origin = jnp.sum(jnp.where(first[..., None], centre[:, None], 0.0), axis=2)  # [W, M, 3]
+    share = (np.arange(1, PUFFS + 1) / PUFFS).astype(np.float32)
+    angle = 2.4 * np.arange(PUFFS)
+    place = np.stack([STEAM_ASIDE * np.cos(angle), STEAM_ASIDE * np.sin(angle), STEAM_HEIGHT * share], axis=-1)
+    low, high = STEAM_RADIUS
+    size = np.repeat((low + (high - low) * share)[:, None], 3, axis=-1)
+    shape = (len(steams), STEAMING, PUFFS)
+    return _slots(
+        SUBSTANCE,
+        there=jnp.broadcast_to(jnp.any(first, axis=-1)[..., None], shape),
+        pos=(origin[:, :, None] + place).astype(jnp.float32),
+        rotation=jnp.broadcast_to(jnp.eye(3), (*shape, 3, 3)),
+        size=jnp.broadcast_to(jnp.asarray(size, jnp.float32), (*shape, 3)),
+        colour=jnp.full((*shape, 3), STEAM_COLOUR, jnp.float32),
+        owner=jnp.full(shape, -1, jnp.int32),
     )
 
 

@@ -13,14 +13,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ig2mj.engine.view import PhysicsView
+from ig2mj.sensors.substance_slots import STEAMS
 from ig2mj.sensors.tints import TINTS, WATER_COLOUR
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.viewer.state_marks import Mark, tint_of_objects
 from ig2mj.viewer.substance_marks import substance_marks
-
-STEAMS = 60.0
-"""Degrees Celsius from which steam rises."""
 
 PUFFS, RISE, PERIOD = 14, 0.26, 1.6
 """Number of puffs, m to which they rise, and s of one's rise."""
