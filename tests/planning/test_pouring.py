@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.agents.humanoid import Humanoid
+from ig2mj.agents.registry import make_robot
 from ig2mj.cli.common.planning import domain_of, expression_of
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.grounding import ground_steps
@@ -15,7 +15,7 @@ from ig2mj.planning.pddl import write_pddl
 from ig2mj.planning.problem import Problem, problem_of
 from ig2mj.planning.requests import RequestSource
 from ig2mj.planning.solver import solve
-from ig2mj.planning.steps import Outcome, PlanningError, Step, make_step
+from ig2mj.planning.steps import Outcome, PlanningError, Step, UnsupportedPrimitive, make_step
 from ig2mj.planning.symbolic import SymbolicRung, start_facts, symbolic_episodes
 from ig2mj.planning.task_planner import TaskPlanner
 from ig2mj.planning.words import NotUnderstoodError, tools
@@ -173,8 +173,9 @@ def test_one_container_stays_as_full_as_all_do_together():
 
 
 @pytest.mark.slow
-def test_the_humanoid_pours_a_mug_full_and_spills_nothing():
-    scene = ig2mj.load_scene("small_home", agents=[Humanoid().at(-1.0, 0.0, 0.0)], objects=JUG)
+@pytest.mark.parametrize("robot", ["humanoid", "fetch"])
+def test_a_robot_pours_a_mug_full_and_spills_nothing(robot):
+    scene = ig2mj.load_scene("small_home", agents=[make_robot(robot).at(-1.0, 0.0, 0.0)], objects=JUG)
     simulation = ig2mj.Simulation(scene, grasping="assisted")
     found = simulation.state_model.substances
     assert found is not None
@@ -185,5 +186,9 @@ def test_the_humanoid_pours_a_mug_full_and_spills_nothing():
     volume = np.asarray(simulation.states.volume)[0, mug, 0]
     assert FILLED * found.containers.litres[mug] < volume < found.containers.litres[mug]
     assert np.asarray(simulation.states.lost).sum() < 1e-3
-    assert simulation.agent.do("pour", "carafe_0", "coffee_table_0", "water").done
-    assert simulation.predicate("covered", "coffee_table_0", "water")
+    if robot == "humanoid":
+        assert simulation.agent.do("pour", "carafe_0", "coffee_table_0", "water").done
+        assert simulation.predicate("covered", "coffee_table_0", "water")
+    else:
+        with pytest.raises(UnsupportedPrimitive, match="has one hand"):
+            simulation.agent.do("spray", "coffee_table_0", "carafe_0", "water")

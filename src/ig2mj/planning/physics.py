@@ -120,6 +120,9 @@ class PhysicsRung:
             name = self.stage.scene.tables.agent_names[self.stage.agent]
             lacks = "has no hand" if not len(self.body.hands) else "has no hand whose motion can be planned"
             raise UnsupportedPrimitive(f"robot '{name}' {lacks}: '{step.primitive}' takes one (humanoid has two)")
+        if step.primitive == "spray" and len(self.body.hands) < 2:
+            name = self.stage.scene.tables.agent_names[self.stage.agent]
+            raise UnsupportedPrimitive(f"robot '{name}' has one hand: 'spray' takes two (humanoid has two)")
         self.domain.check(step)
 
     def begin(self, world: int, step: Step) -> None:

@@ -46,13 +46,14 @@ TILTS = np.arange(np.deg2rad(10.0), np.deg2rad(171.0), FINE)
 """rad by which it may be turned."""
 
 DOSES, DOSE = 3, 0.02
-"""Turns in which a container is filled, and litres that flow out in one of those that cover something."""
+"""Turns in which what is wanted flows out, and litres of it where something is covered."""
 
 CHECKED = np.deg2rad([30.0, 60.0, 90.0, 120.0, 150.0])
-"""rad at which container and hand must have room."""
+"""rad at which container and hand must have room, as far as it is turned."""
 
-TURNING, LOOK, LOOKS = 8, 2, 40
-"""Agent steps that each turn takes at most, those between looks at what flows, and looks at each tilt, at most."""
+TURNING, ARM_TURNING, LOOK, LOOKS = 8, 40, 2, 40
+"""Agent steps that each turn takes at most, of a hand that floats and of one on an arm, those between looks at what
+flows, and looks at each tilt, at most."""
 
 SPILT, MISSED = 2e-3, 0.5
 """Litres that flow out before it is asked where they are, and the share of them that must be in the target."""
@@ -122,11 +123,12 @@ def _turned_over(world: PlannedWorld, step: Step, hand: int, number: int) -> Gen
     if number >= len(places):
         return f"the opening of {target} does not face upwards"
     motion = _Motion(world, name, hand, places[number])
-    direction = next((d for d in motion.directions() if motion.has_room(d)), None)
+    litres_wanted = FILLED * world.domain.litres(target) or DOSE
+    direction = next((d for d in motion.directions() if motion.has_room(d, litres_wanted)), None)
     if direction is None:
         return f"there is no room to turn {name} over above {target}"
     said, tilt = "", 0.0
-    dose = FILLED * world.domain.litres(target) / DOSES or DOSE
+    dose = litres_wanted / DOSES
     while tilt < TILTS[-1]:
         goal = motion.tilt_for(direction, tilt, dose)
         if (yield motion.program(direction, tilt, goal, keeps)):
@@ -186,6 +188,7 @@ class _Motion:
         self._quat = world.hand_quat(hand)
         self._frame = matrices_on_host(world.pose(name)[1][None])[0]
         self._obstacles = world.obstacles([name], world.stance)
+        self._limit = TURNING if world.body.opening is None else ARM_TURNING
 
     def directions(self) -> Iterator[Vector]:
         """Horizontal unit vectors, those away from the robot first."""
@@ -205,9 +208,11 @@ class _Motion:
     def _rotation(self, direction: Vector, tilt: float) -> Rotation:
         return turn_onto(UP, np.cos(tilt) * UP + np.sin(tilt) * direction) @ self._upright
 
-    def has_room(self, direction: Vector) -> bool:
-        """Whether the hand with the container has room, and reaches, at all tilts."""
-        return all(self._free(self.pose(direction, float(tilt))) for tilt in CHECKED)
+    def has_room(self, direction: Vector, wanted: float) -> bool:
+        """Whether the hand with the container has room, and reaches, at all tilts up to where so many litres have
+        flowed out."""
+        last = self.tilt_for(direction, 0.0, wanted)
+        return all(self._free(self.pose(direction, float(tilt))) for tilt in (*CHECKED[last > CHECKED], last))
 
     def _free(self, pose: _Pose) -> bool:
         world, hand = self._world, self._hand
@@ -215,6 +220,9 @@ class _Motion:
             return False
         axes = world.hand_axes(hand, pose.rotation)
         spheres = world.spheres(*axes, holding=self._name, hand=hand, rotation=pose.rotation)
+        follows = world.follows(hand, world.turned_hand(hand, pose.rotation), self._obstacles)
+        if follows is not None and not follows.reaches(pose.grip):
+            return False
         return self._obstacles.clear(np.column_stack([spheres[:, :3] + pose.grip, spheres[:, 3]]))
 
     def tilt_for(self, direction: Vector, tilt: float, dose: float) -> float:
@@ -238,5 +246,5 @@ class _Motion:
         turned = matrix_to_quat(pose.rotation @ matrices_on_host(self._quat[None])[0])
         return Phase(
             hand=self._hand, pos=vector3(pose.grip), quat=quaternion(turned), keeps=keeps, tolerance=0.01,
-            turn_tolerance=0.04, limit=TURNING, after="",
+            turn_tolerance=0.04, limit=self._limit, after="",
         )  # fmt: skip
