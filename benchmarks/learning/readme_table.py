@@ -38,7 +38,12 @@ def table() -> str:
         robot, grasping = card["robot, grasping"].split(", ")
         if (robot, grasping) not in COLUMNS:
             raise ValueError(f"{file.name}: there is no column for {robot}, {grasping}")
-        cells.setdefault(card["task"], {})[robot, grasping] = f"{success[1]} %{_remarks(card)}"
+        row = (
+            f"{card['task']}, {len(card['homes of training'].split(', '))} homes"
+            if "homes of training" in card
+            else card["task"]
+        )
+        cells.setdefault(row, {})[robot, grasping] = f"{success[1]} %{_remarks(card)}"
     head = " | ".join(f"{robot}, {grasping}" for robot, grasping in COLUMNS)
     lines = [f"| task | {head} |", "|---" + "|--:" * len(COLUMNS) + "|"]
     lines += [f"| {task} | " + " | ".join(row.get(c, "") for c in COLUMNS) + " |" for task, row in cells.items()]

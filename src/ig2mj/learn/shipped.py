@@ -185,14 +185,22 @@ def model_card(name: str, policy: Policy) -> str:
         "seconds of compilation before": None if card.get("compile_s") is None else round(card["compile_s"]),
         "environment steps": f"{card['env_steps']:,}" if card.get("env_steps") else None,
         "device": card.get("device"),
-        "scene": card.get("scene"),
+        "homes of training": ", ".join(card["homes"]) if "homes" in card else None,
+        "differs between its episodes": card.get("run_settings", {}).get("randomize", "").replace(",", ", ") or None,
+        "scene": None if "homes" in card else card.get("scene"),
         "weights": policy.weights_digest,
     }
     lines = [f"# {name}", "", "| | |", "|---|---|"]
     lines += [f"| {key} | {value} |" for key, value in rows.items() if value is not None]
+    trained = (
+        f"It was trained in {len(card['homes'])} simulated homes and evaluated in the task's own, with the same objects at "
+        "other places"
+        if "homes" in card
+        else "It was trained and evaluated in one simulated home, with the same objects at other places"
+    )
     limits = (
-        "It is for this task, robot, way of grasping and observation alone, and refused for others. It was trained and "
-        "evaluated in one simulated home, with the same objects at other places; it has not been tried on a real robot."
+        "It is for this task, robot, way of grasping and observation alone, and refused for others. "
+        f"{trained}; it has not been tried on a real robot."
     )
     commands = [f"    ig2mj evaluate {name}" + " --stochastic" * found["drawn"], f"    ig2mj view --policy {name}"]
     if any((folder / f"{name}.toml").is_file() for folder in (CHECKOUT, INSTALLED)):

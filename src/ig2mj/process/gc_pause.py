@@ -16,6 +16,7 @@ import threading
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from ig2mj.process.large_constants import WithLargeConstants
 from ig2mj.process.worker_threads import spawn
 
 
@@ -66,7 +67,8 @@ def collect_seldom() -> None:
 
 
 class Compiled:
-    """`jax.jit` of a function, traced and lowered while the collector is paused. Offers what `jax.jit` offers.
+    """`jax.jit` of a function, traced and lowered while the collector is paused, large constants passed as arguments
+    (`ig2mj.process.large_constants`). Offers what `jax.jit` offers.
 
     For programs of a millisecond or more: each call costs half a microsecond extra.
     """
@@ -75,11 +77,12 @@ class Compiled:
         """
         Args:
           check: called with the first argument before every call.
-          options: of `jax.jit`.
+          options: of `jax.jit`. With others than `donate_argnums` constants stay in the program.
         """
         import jax
 
-        self._compiled: Any = jax.jit(function, **options)
+        whole = options.keys() - {"donate_argnums"}
+        self._compiled: Any = jax.jit(function, **options) if whole else WithLargeConstants(function, **options)
         self._check = check
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
