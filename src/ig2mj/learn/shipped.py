@@ -192,15 +192,13 @@ def model_card(name: str, policy: Policy) -> str:
     }
     lines = [f"# {name}", "", "| | |", "|---|---|"]
     lines += [f"| {key} | {value} |" for key, value in rows.items() if value is not None]
-    trained = (
-        f"It was trained in {len(card['homes'])} simulated homes and evaluated in the task's own, with the same objects at "
-        "other places"
-        if "homes" in card
-        else "It was trained and evaluated in one simulated home, with the same objects at other places"
-    )
+    number = len(card.get("homes", ()))
+    where = "trained and evaluated in one simulated home"
+    if number:
+        where = f"trained in {number} simulated homes and evaluated in the task's own"
     limits = (
         "It is for this task, robot, way of grasping and observation alone, and refused for others. "
-        f"{trained}; it has not been tried on a real robot."
+        f"It was {where}, with the same objects at other places; it has not been tried on a real robot."
     )
     commands = [f"    ig2mj evaluate {name}" + " --stochastic" * found["drawn"], f"    ig2mj view --policy {name}"]
     if any((folder / f"{name}.toml").is_file() for folder in (CHECKOUT, INSTALLED)):
