@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
+from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.grasping import grasp
 from ig2mj.planning.holding import Hold, hold_at, wait_until
 from ig2mj.planning.moves import (
@@ -39,15 +40,29 @@ def _holds_at(world: PlannedWorld, name: str, hand: int, points: Sequence[Vector
 def _blades_at(
     world: PlannedWorld, knife: str, hand: int, points: Sequence[Vector], link: int, first: int
 ) -> list[Hold]:
-    """The blade of a held knife at some points, as it is held and turned about the vertical.
+    """The blade of a held knife at some points, with its edge down, and as it is held, turned about the vertical: where
+    its flat lies on what is cut, that rolls away.
 
     Args:
-      link: of the knife, its blade. first: number of the direction that comes first.
+      link: of the knife, its blade. first: number of the way that comes first; even ones: with the edge down, of a hand
+        on an arm, as it is held.
     """
     offset = world.grip(hand) - np.asarray(world.view.link_pos)[world.world, link].astype(float)
-    turns = [about_vertical(turn) for turn in BLADE_TURNS]
-    ways = [(point, turns[k]) for point in points for k in np.roll(np.arange(len(turns)), -first)]
+    turns = np.roll([about_vertical(turn) for turn in BLADE_TURNS], -first, axis=0)
+    tilts = [_edge_down(world, knife, link), np.eye(3)]
+    tilts = tilts if (first % 2 == 0) == (world.body.opening is None) else tilts[::-1]
+    ways = [(point, turn @ tilt) for tilt in tilts if tilt is not None for point in points for turn in turns]
     return [Hold(point, turn @ offset, turn, number) for number, (point, turn) in enumerate(ways)]
+
+
+def _edge_down(world: PlannedWorld, knife: str, link: int) -> Rotation | None:
+    """The rotation after which a blade is level and below the middle of its knife; None: the blade is in the middle."""
+    tables = world.domain.model.tables
+    pos, quat = (np.asarray(v)[world.world, link].astype(float) for v in (world.view.link_pos, world.view.link_quat))
+    along = matrices_on_host(quat[None])[0][:, int(np.argmax(tables.link_half[link]))]
+    out = pos - world.com(knife)
+    out = out - (out @ along) * along
+    return turn_onto(out, DOWN) if np.linalg.norm(out) > EDGE else None
 
 
 def _holds_below(world: PlannedWorld, name: str, hand: int, source: Vector) -> list[Hold]:
@@ -182,6 +197,9 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
         return Outcome(attempts=ATTEMPTS)
     return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
 
+
+EDGE = 0.005
+"""m between a blade and the middle of its knife, across the blade, from which on it is the knife's edge."""
 
 BLADE_TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)
 """rad by which a blade is turned about the vertical: what rolled away from it is cut from another side."""
