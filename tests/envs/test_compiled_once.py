@@ -15,6 +15,7 @@ from ig2mj.envs.actor import Actor
 from ig2mj.envs.rollout import play
 from ig2mj.errors import ActionError
 from ig2mj.process.compilation import XLA_EVENT
+from ig2mj.process.gc_pause import compile_together
 from ig2mj.sensors.base import SensorOptions
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
@@ -70,6 +71,21 @@ def test_the_steps_of_an_actor_are_compiled_together_with_the_start(env, compile
     assert {"jit(_load_fn)", "jit(_several_fn)"} <= set(before)
     assert not set(before) & set(compiled), "the calls find what was compiled"
     assert played.steps == 3 * WORLDS and short.following is None
+
+
+def test_programs_of_a_start_are_compiled_before_it_is_asked_for(env, compiled, monkeypatch):
+    """`start_programs`: the start, and what follows it; a start of the same shapes then compiles nothing."""
+    short = env.with_horizon(4)
+    engine, actor = short.core.engine, Actor(short, _still)
+    pending = [engine._first.traced(engine._template, engine._initial)]
+    monkeypatch.setattr(engine, "pending_reset_program", lambda: pending.pop() if pending else None)
+    short.following = lambda state: [actor.traced(state, short.objective.outcomes)]
+    compile_together(short.start_programs(rows=np.array([2, 3]), seed=[7, 8]))
+    assert {"jit(_load_fn)", "jit(_several_fn)"} <= set(compiled)
+    compiled.clear()
+    assert not short.start_programs() and not compiled
+    play(short, actor, WORLDS, in_order=True, seeds=[7, 8, 9, 10])
+    assert not {"jit(_load_fn)", "jit(_several_fn)"} & set(compiled)
 
 
 def _still(obs, kept, begins, key):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import json
+import weakref
 
 import numpy as np
 import pytest
@@ -10,8 +12,9 @@ import pytest
 from ig2mj.cli.common.axes import Output, play_axes
 from ig2mj.cluster.journal import MemoryStore
 from ig2mj.errors import InputError, PolicyServerError
-from ig2mj.learn.axes import AxisResult, Batch, batches_of, evaluate_axes, result_of
+from ig2mj.learn.axes import AxisResult, Batch, _ready, batches_of, evaluate_axes, result_of
 from ig2mj.learn.episodes import EpisodePart, Episodes, find_episodes
+from ig2mj.process.together import TOGETHER
 
 OPTIONS = {"engine": "native", "worlds": 2, "horizon": 2, "observations": "proprioception"}
 AXES = ("nominal", "sensor_noise", "lights")
@@ -51,6 +54,63 @@ def test_failures_have_the_numbers_of_the_file():
     result = AxisResult("homes", [True, False, False], [1.0, 0.5, 0.0], [1, 4, 7])
     assert result.failures == [(4, 0.5), (7, 0.0)]
     assert AxisResult("homes", [False, True], [0.25, 1.0]).failures == [(0, 0.25)]
+
+
+class Home:
+    """An environment of which nothing is known but whether its engine is pure."""
+
+    num_worlds = 2
+
+    def __init__(self, pure: bool):
+        self.pure = pure
+
+
+class Shown:
+    """A stage that notes in `log` when its environment is made, and when its programs are traced and compiled."""
+
+    def __init__(self, name: str, pure: bool, log: list[str]):
+        self.axes, self.part, self._name, self._pure, self._log = (name,), EpisodePart(name, (0, 1)), name, pure, log
+        self.made: weakref.ref[Home] = weakref.ref(Home(pure))
+
+    def environment(self, options):
+        self._log.append(f"{self._name} made{' together' if TOGETHER.active else ''}")
+        env = Home(self._pure)
+        self.made = weakref.ref(env)
+        return env
+
+    def programs(self, env, axis, rows):
+        assert env is self.made() and axis == self._name and rows == [0, 1]
+        self._log.append(f"{self._name} traced")
+        return [self]
+
+    def compiling(self):
+        self._log.append(f"{self._name} compiled")
+        done = concurrent.futures.Future()
+        done.set_result(None)
+        return done
+
+
+class Everything:
+    """A ledger of which nothing is over."""
+
+    def pending(self, stage):
+        return [Batch(stage.axes[0], stage.part, 0, 2)]
+
+
+@pytest.mark.parametrize("pure", [True, False], ids=["pure", "native"])
+def test_programs_of_pure_engines_are_compiled_side_by_side_before_the_first_is_played(pure):
+    """On the native engine there is one environment at a time."""
+    log: list[str] = []
+    shown = [Shown(name, pure, log) for name in ("a", "b", "c")]
+    for stage, env, act in _ready(shown, Everything(), lambda env: lambda state: None, {}):
+        assert env is stage.made()
+        log.append(f"{stage.axes[0]} played")
+        del env, act
+    made = ["a made together", "b made together", "c made together"]
+    compiled = ["a traced", "a compiled", "b traced", "b compiled", "c traced", "c compiled"]
+    one_by_one = ["a made together", "a played", "b made", "b played", "c made", "c played"]
+    assert log == ([*made, *compiled, "a played", "b played", "c played"] if pure else one_by_one)
+    assert not any(stage.made() for stage in shown), "their memory is free"
 
 
 @pytest.mark.slow

@@ -286,15 +286,29 @@ class Environment(StateCopies, StateImages, Instructed, Configured):
         rows = np.zeros(self.num_worlds, np.int32) if rows is None else np.asarray(rows, np.int32)
         return self._loaded(seed, starts, None if draw is None else jax.tree.map(jnp.asarray, draw), rows)
 
+    def start_programs(
+        self,
+        starts: Pool | None = None,
+        draw: Draw | None = None,
+        rows: Int[np.ndarray, "W"] | None = None,
+        seed: Seed = 0,
+    ) -> list[Traced]:
+        """The programs of `start_with`, without `starts` those of `start_from`, and those that follow (`following`):
+        traced and not compiled, as `pending_programs`."""
+        rows = np.zeros(self.num_worlds, np.int32) if rows is None else np.asarray(rows, np.int32)
+        draw = None if draw is None else jax.tree.map(jnp.asarray, draw)
+        physics = self.core.engine.pending_reset_program()
+        if physics is None:
+            return []
+        load = self._load.traced(physics.returned, as_seed(seed, self.num_worlds), starts, draw, rows)
+        return [*(() if self.following is None else self.following(load.returned)), load, physics]
+
     def _loaded(self, seed: Seed, starts: Pool | None, draw: Draw | None, rows: Int[np.ndarray, "W"]) -> EnvState:
         """`start_from`, or with states `start_with`. While kernels are being loaded, its programs are compiled together
         with those that follow."""
-        seeds, physics = as_seed(seed, self.num_worlds), self.core.engine.pending_reset_program()
-        if physics is not None:
-            load = self._load.traced(physics.returned, seeds, starts, draw, rows)
-            compile_together([*(() if self.following is None else self.following(load.returned)), load, physics])
+        compile_together(self.start_programs(starts, draw, rows, seed))
         with GC_PAUSED:
-            return self._load(self.core.engine.reset(), seeds, starts, draw, rows)
+            return self._load(self.core.engine.reset(), as_seed(seed, self.num_worlds), starts, draw, rows)
 
     def _load_fn(
         self, physics: Physics, seed: Seeds, starts: Pool | None, draw: Draw | None, rows: Int[Array, "W"]

@@ -10,13 +10,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.cluster.journal import Journal, MemoryStore
+from ig2mj.engine.registry import made_together
 from ig2mj.envs.actor import Actor
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.rollout import Act, Played, play
@@ -24,6 +25,7 @@ from ig2mj.errors import PolicyServerError
 from ig2mj.learn.episodes import ALL, EpisodePart, Episodes
 from ig2mj.learn.evaluate import wilson
 from ig2mj.learn.stages import Stage, stages
+from ig2mj.process.gc_pause import Traced, compile_together
 
 ActOf = Callable[[Environment], Act]
 """The agent of an environment, which is asked for once and plays all of its axes."""
@@ -183,27 +185,64 @@ def evaluate_axes(
     """
     ledger = Ledger(episodes, axes, count, options.get("worlds", 1), MemoryStore() if store is None else store)
     try:
-        for stage in stages(episodes, axes, count, options.get("robot")):
-            if ledger.pending(stage):
-                cut_off = _play_stage(stage, ledger, act_of, options, report, finished)
-                if cut_off is not None:
-                    return Evaluation(ledger.begun(*cut_off), cut_off[1].failed)
+        pending = [s for s in stages(episodes, axes, count, options.get("robot")) if ledger.pending(s)]
+        for stage, env, act in _ready(pending, ledger, act_of, options):
+            cut_off = _play_stage(stage, env, act, ledger, report, finished)
+            if cut_off is not None:
+                return Evaluation(ledger.begun(*cut_off), cut_off[1].failed)
+            del env, act  # their memory, before the next environment is made
     except KeyboardInterrupt:
         return Evaluation(ledger.begun(), interrupted=True)
     return Evaluation(ledger.complete())
 
 
+def _ready(
+    pending: Sequence[Stage], ledger: Ledger, act_of: ActOf, options: Mapping[str, Any]
+) -> Iterator[tuple[Stage, Environment, Act]]:
+    """Stages with their environments and agents, whose memory is free when the next is asked for.
+
+    Environments of pure engines are made before the first is played, their kernels loaded and their programs compiled
+    side by side; those of a stage are traced while those of the stages before it are compiled. While a stage is played
+    nothing is compiled: CUDA graphs are captured then.
+    """
+    waiting, made = list(pending), list[tuple[Stage, Environment, Act]]()
+
+    def make_next() -> None:
+        stage = waiting.pop(0)
+        env = stage.environment(options)
+        made.append((stage, env, act_of(env)))
+
+    with made_together():
+        while waiting and (not made or made[-1][1].pure):
+            make_next()
+    compile_together(program for stage, env, act in made for program in _programs(stage, env, act, ledger))
+    while made or waiting:
+        if not made:
+            make_next()
+        yield made.pop(0)
+
+
+def _programs(stage: Stage, env: Environment, act: Act, ledger: Ledger) -> list[Traced]:
+    """What plays the first batch of a stage, traced; empty where the engine runs what is compiled when it is called."""
+    if not env.pure:
+        return []
+    batch = ledger.pending(stage)[0]
+    if isinstance(act, Actor):
+        env.following = lambda state: [act.traced(state, env.objective.outcomes)]
+    programs = stage.programs(env, batch.axis, (batch.first + np.arange(env.num_worlds)).tolist())
+    env.following = None
+    return programs
+
+
 def _play_stage(
     stage: Stage,
+    env: Environment,
+    act: Act,
     ledger: Ledger,
-    act_of: ActOf,
-    options: Mapping[str, Any],
     report: ProgressCallback,
     finished: Callable[[list[AxisResult]], None],
 ) -> tuple[Batch, Played] | None:
     """Plays what is pending of a stage. Returns the batch that a policy server left; None: none."""
-    env = stage.environment(options)
-    act = act_of(env)
     for batch in ledger.pending(stage):
         before = ledger.share
 

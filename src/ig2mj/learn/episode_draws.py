@@ -1,7 +1,8 @@
 """Values that were drawn for the episodes of a file, so that they stay when the code that draws changes.
 
     values = EpisodeDraws.drawn(environments, episodes)
-    state = values.start(env, rows, numbers, seeds, ["lights"])
+    starts, draw = values.made(env, rows, numbers, seeds, ["lights"])
+    state = env.start_with(starts, draw, rows, seeds)
 
 Of each episode: the models of the task's objects, lights, cameras, the strength of noise, the wording, and where each
 robot starts. Factors of objects and materials (`Randomization.values`) come in `SETS` sets, of which episode k has set
@@ -21,6 +22,7 @@ import numpy as np
 
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import EngineError
+from ig2mj.process.gc_pause import Traced
 from ig2mj.worlds.draw import Draw
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import episode_keys
@@ -43,6 +45,27 @@ OF_AXIS = {
     "instructions": ("instruction",),
 }
 """Values of each axis of `ig2mj.Randomize`; robots' starts and models are named by robot and object."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Beginning:
+    """What episodes start from, one in each world. Attributes: starts, draw: see `EpisodeDraws.made`. rows: of the
+    environment's pool. seeds: of each."""
+
+    starts: Pool | None
+    draw: Draw | None
+    rows: np.ndarray
+    seeds: tuple[int, ...]
+
+    def start(self, env: Environment) -> EnvState:
+        """The state at the start."""
+        if self.starts is None:
+            return env.start_from(self.rows, list(self.seeds))
+        return env.start_with(self.starts, self.draw, self.rows, list(self.seeds))
+
+    def programs(self, env: Environment) -> list[Traced]:
+        """Those that `start` runs (`Environment.start_programs`)."""
+        return env.start_programs(self.starts, self.draw, self.rows, list(self.seeds))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,15 +92,16 @@ class EpisodeDraws:
             found["robot_start"] = self.robots[robot][rows].astype(np.float32)
         return found
 
-    def start(
+    def made(
         self,
         env: Environment,
         rows: Sequence[int],
         numbers: Sequence[int],
         seeds: Sequence[int],
         axes: Sequence[str],
-    ) -> EnvState:
-        """All worlds of an environment at the start of these episodes.
+    ) -> tuple[Pool | None, Draw | None]:
+        """States at the start of these episodes, one for each world of an environment, and what was drawn for them;
+        None: they are rows of the environment's pool as they are, or follow from the seeds, in files without values.
 
         Args:
           env: with the axes that vary; others of its axes are as the scene has them. rows: of its pool. numbers: of
@@ -86,22 +110,9 @@ class EpisodeDraws:
         Raises:
           EngineError: the file lacks a model of the environment's, or the other way round, or values of an axis.
         """
-        if env.config.randomize is None or not self.arrays:  # without values everything follows from the seeds
-            return env.start_from(np.asarray(rows), list(seeds))
-        made, draw = self.made(env, rows, numbers, seeds, axes)
-        return env.start_with(made, draw, np.asarray(rows), list(seeds))
-
-    def made(
-        self,
-        env: Environment,
-        rows: Sequence[int],
-        numbers: Sequence[int],
-        seeds: Sequence[int],
-        axes: Sequence[str],
-    ) -> tuple[Pool, Draw]:
-        """States at the start of these episodes, and what was drawn for them; arguments and errors as of `start`."""
         starts, randomize = env.core.starts, env.config.randomize
-        assert randomize is not None
+        if randomize is None or not self.arrays:
+            return None, None
         varied = [axis for axis in randomize.axes if axis in axes]
         for axis in varied:
             if lacking := [name for name in OF_AXIS.get(axis, ()) if name not in self.arrays]:

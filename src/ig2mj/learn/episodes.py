@@ -31,7 +31,7 @@ import numpy as np
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import find_task, make
 from ig2mj.errors import EngineError, InputError, UnknownNameError
-from ig2mj.learn.episode_draws import FACTORS, SETS, EpisodeDraws, described_draw, model_names
+from ig2mj.learn.episode_draws import FACTORS, SETS, Beginning, EpisodeDraws, described_draw, model_names
 from ig2mj.scene.found_again import entries_of
 from ig2mj.sensors.cameras import camera_names
 from ig2mj.tasks.homes import in_home
@@ -154,17 +154,20 @@ class Episodes:
             pool = self.poses
         return {"pool": pool, **({"randomize": settings} if settings else {})}
 
-    def start(self, env: Environment, axis: str, part: EpisodePart, rows: Sequence[int], behind: int = 0) -> EnvState:
+    def start(self, env: Environment, axis: str, part: EpisodePart, rows: Sequence[int]) -> EnvState:
         """The state at the start of episodes: rows of a part, each in one world of an environment in which the axis
-        varies. What else varies there is as the scene has it.
+        varies. What else varies there is as the scene has it."""
+        return self.beginning(env, axis, part, rows).start(env)
 
-        Args:
-          behind: rows of the environment's pool before those of the axis.
-        """
+    def beginning(
+        self, env: Environment, axis: str, part: EpisodePart, rows: Sequence[int], behind: int = 0
+    ) -> Beginning:
+        """What `start` starts from. `behind`: rows of the environment's pool before those of the axis."""
         numbers = [part.numbers[int(row) % len(part.numbers)] for row in rows]
         rows = [int(row) % len(part.numbers) for row in rows] if part.home is not None else numbers
-        seeds = [self.seeds[number] for number in numbers]
-        return self.draws.start(env, [behind + row for row in rows], numbers, seeds, tuple(self.axes[axis]))
+        rows, seeds = [behind + row for row in rows], [self.seeds[number] for number in numbers]
+        starts, draw = self.draws.made(env, rows, numbers, seeds, tuple(self.axes[axis]))
+        return Beginning(starts, draw, np.asarray(rows, np.int32), tuple(seeds))
 
     def described_draws(self, axis: str, number: int, robot: str, names: Sequence[str]) -> dict[str, Any]:
         """What was drawn for an episode, for people. `names`: of the scene's objects."""

@@ -26,7 +26,9 @@ import numpy as np
 
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import make
+from ig2mj.learn.episode_draws import Beginning
 from ig2mj.learn.episodes import POSES, EpisodePart, Episodes
+from ig2mj.process.gc_pause import Traced
 from ig2mj.tasks.instructions import wordings
 from ig2mj.worlds.pool import Pool, stack
 
@@ -74,10 +76,17 @@ class Stage:
         are fewer. `env`: of `environment`; `env.instruction` then is as in these episodes."""
         header, varied = self.episodes.header, self.episodes.axes[axis]
         env.wordings = tuple(header["instructions"]["held_out"]) if WORDS in varied else wordings(env.task)
+        return self._beginning(env, axis, rows).start(env)
+
+    def programs(self, env: Environment, axis: str, rows: Sequence[int]) -> list[Traced]:
+        """Those that `start` runs, and `env.following` (`Environment.start_programs`)."""
+        return self._beginning(env, axis, rows).programs(env)
+
+    def _beginning(self, env: Environment, axis: str, rows: Sequence[int]) -> Beginning:
         numbers = np.asarray(rows, int) % len(self.part.numbers)
         usual = any(not self._poses(one) for one in self.axes)
         behind = self.episodes.count if usual and self._poses(axis) else 0
-        return self.episodes.start(env, axis, self.part, numbers.tolist(), behind)
+        return self.episodes.beginning(env, axis, self.part, numbers.tolist(), behind)
 
 
 def stages(episodes: Episodes, axes: Sequence[str], count: int, robot: Any = None) -> list[Stage]:
