@@ -192,3 +192,13 @@ def test_a_robot_pours_a_mug_full_and_spills_nothing(robot):
     else:
         with pytest.raises(UnsupportedPrimitive, match="has one hand"):
             simulation.agent.do("spray", "coffee_table_0", "carafe_0", "water")
+
+
+@pytest.mark.slow
+def test_a_towel_in_a_drawer_is_brought_out_and_soaked_though_it_lies_upside_down():
+    scene = ig2mj.load_scene("small_home", agents=[make_robot("humanoid").at(-1.0, 0.0, 0.0)], objects=JUG)
+    simulation = ig2mj.Simulation(scene, grasping="assisted")
+    for request in ("open bottom_cabinet_0", "grasp carafe_0", "pour carafe_0 dishtowel_0 water"):
+        outcome = simulation.agent.do(*request.split())
+        assert outcome.done, f"{request}: {outcome}"
+    assert simulation.predicate("saturated", "dishtowel_0", "water")

@@ -62,7 +62,7 @@ def surfaces(world: PlannedWorld) -> Surfaces:
 
 def free_points(world: PlannedWorld, name: str, least: float) -> Float[np.ndarray, "N 3"]:
     """Points of an object's surface that substances can cover and that lie open above, m, world frame; the nearest to
-    the robot first.
+    the robot first, and at last its top above its centre of mass, for what lies upside down.
 
     Args:
       least: z of the normal of a point, at least.
@@ -75,6 +75,7 @@ def free_points(world: PlannedWorld, name: str, least: float) -> Float[np.ndarra
     obstacles = world.obstacles([name, *(n for n in world.held if n)])
     stream = np.array([[0.0, 0.0, 0.0, THICK]])
     low, high = (above * np.array([0.0, 0.0, 1.0]) for above in FREE)
-    free = [p for p in points if straight(obstacles, stream, p + low, p + high)]
     here, _ = world.base
-    return np.array(sorted(free, key=lambda p: float(np.linalg.norm(p[:2] - here)))).reshape(-1, 3)
+    top = np.array([*world.com(name)[:2], world.vertices(name)[:, 2].max()])
+    ordered = [*sorted(points, key=lambda p: float(np.linalg.norm(p[:2] - here))), top]
+    return np.array([p for p in ordered if straight(obstacles, stream, p + low, p + high)]).reshape(-1, 3)

@@ -66,7 +66,7 @@ def pour(world: PlannedWorld, step: Step) -> Primitive:
         return Outcome("not_true_after", reason)
     hand_with(world, name)
     failed = set[int]()
-    reason, detail = "not_true_after", f"{target} has no place that faces upwards"
+    reason, detail = "not_true_after", f"{target} has no place that lies open above"
     for attempt in range(PLACES):
         if _holds(world, step):
             return Outcome(attempts=max(attempt, 1))

@@ -34,13 +34,13 @@ def primitive(world: PlannedWorld, step: Step) -> Primitive:
     return through_doors(world, step, _tried_again)
 
 
-BROUGHT_OUT = ("open", "close", "toggle_on", "toggle_off", "wipe", "scrub", "slice")
+BROUGHT_OUT = ("open", "close", "toggle_on", "toggle_off", "wipe", "scrub", "slice", "pour", "spray")
 """Primitives that are tried again on open floor, with things that can be carried there."""
 
 
 def _tried_again(world: PlannedWorld, step: Step) -> Primitive:
     """A primitive; what can be carried is brought out into the open where it fails, once."""
-    action, name = ACTIONS[step.primitive], step.object
+    action, (name, tool) = ACTIONS[step.primitive], _about(step)
     outcome = yield from _guarded(action(world, step))
     if outcome.done or step.primitive not in BROUGHT_OUT or outcome.reason in ("slipped", "timeout"):
         return outcome
@@ -48,10 +48,16 @@ def _tried_again(world: PlannedWorld, step: Step) -> Primitive:
         return outcome
     if not (yield from _guarded(bring_out(world, name))).done:
         return outcome
-    tool = step.arguments[-1]
     if tool != name and tool not in world.held and not (yield from _guarded(grasp(world, Step("grasp", (tool,))))).done:
         return outcome
     return (yield from _guarded(action(world, step)))
+
+
+def _about(step: Step) -> tuple[str, str]:
+    """What a step changes, and what it changes that with; of a step without tool, the same twice."""
+    if step.primitive == "pour":
+        return step.things[1], step.object
+    return step.object, step.things[-1]
 
 
 def _guarded(inner: Primitive) -> Primitive:
