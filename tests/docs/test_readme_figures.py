@@ -55,7 +55,7 @@ def facts() -> list[str]:
     policies = len(list((ROOT / "policies").glob("*.npz")))
     speed = max(_speeds("the home `birch`"))
     image = SensorOptions()
-    number = {4: "four", 15: "Fifteen"}
+    number = {4: "four", 16: "Sixteen"}
     return [
         f"**{len(homes)} furnished homes** with {rooms} rooms and {models:,} object models ship",
         f"{len(PREDICATES)} predicates",
