@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from ig2mj.geometry.host_rotations import about_vertical
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.free_floor import POCKET, FreeFloor
 from ig2mj.planning.occupancy import RESOLUTION, Occupancy
 from ig2mj.planning.placing import DEEP_DROPS, _drop
+from ig2mj.planning.spots import ends_down
+from ig2mj.planning.world import PlannedWorld
 
 
 class _Cells(Occupancy):
@@ -70,3 +73,34 @@ def test_an_object_falls_from_the_lowest_height_at_which_the_hand_has_room():
     assert _drop(_Bucket(), np.array([held]), goal, DEEP_DROPS) == 0.0
     assert _drop(_Bucket(), np.array([hand, held]), goal, DEEP_DROPS) == 0.16
     assert _drop(_Bucket(), np.array([hand, held]), goal, (0.0, 0.05)) is None
+
+
+class _Held(PlannedWorld):
+    """A world in which a hand holds a box with sides along x, y and z (m), which lies askew, near its first end."""
+
+    def __init__(self, *sides: float):
+        turn = about_vertical(0.4)
+        self._corners = (np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T * sides) @ turn.T + (0.3, 0.2, 0.8)
+        self._grip = np.array([0.3, 0.2, 0.8]) - 0.35 * sides[0] * turn[:, 0]
+
+    def vertices(self, name):
+        return self._corners
+
+    def com(self, name):
+        return self._corners.mean(0)
+
+    def grip(self, hand):
+        return self._grip
+
+
+def test_what_is_long_is_put_with_an_end_first_that_away_from_the_hand_before_the_other():
+    world = _Held(0.2, 0.06, 0.04)
+    first, second = ends_down(world, "", 0)
+    for tilt, below in ((first, True), (second, False)):
+        turned = (world.vertices("") - world.grip(0)) @ tilt.T
+        assert np.ptp(turned[:, 2]) == pytest.approx(0.2) and np.hypot(*np.ptp(turned[:, :2], axis=0)) < 0.11
+        assert (turned[:, 2].mean() < 0.0) == below
+
+
+def test_what_is_not_longer_than_wide_has_no_end():
+    assert ends_down(_Held(0.1, 0.1, 0.1), "", 0) == []

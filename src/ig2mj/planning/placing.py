@@ -38,7 +38,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.opening import Tried, open_into
 from ig2mj.planning.phases import Phase, Until
-from ig2mj.planning.spots import Spot, grip_for, is_tipped, put_there, spots_for, spots_upon
+from ig2mj.planning.spots import Spot, ends_down, grip_for, is_tipped, put_there, spots_for, spots_upon
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.two_hands import place_with_both
@@ -175,7 +175,12 @@ def _find(
     if found == _NO_WAY and name in world.held:
         found = _plan(world, predicate, name, hand, spots, search=True)
         if found == _NO_WAY and predicate in FALLS_OVER:
-            found = _plan(world, predicate, name, hand, spots_for(world, predicate, name, where, hanging=True))
+            ends = ends_down(world, name, hand) if predicate == "inside" and world.body.opening is None else []
+            for tilt in (np.eye(3), *ends):
+                spots = spots_for(world, predicate, name, where, hanging=tilt)
+                found = _plan(world, predicate, name, hand, spots)
+                if not isinstance(found, str):
+                    break
     return found, ()
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.geometry.host_rotations import quat_conjugate, quat_multiply, yaw_quat
+from ig2mj.geometry.host_rotations import matrix_to_quat, quat_conjugate, quat_multiply, turn_onto, yaw_quat
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.arm_orientations import ARM_TURNS, level_orientations
 from ig2mj.planning.bodies import CORNER
@@ -53,6 +53,9 @@ UPON = ((0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.0, 0.05), (0.0, -0.05))
 STANDS = 0.8
 """Cosine of the angle of an object's own vertical up to which it stands upright."""
 
+LONGER = 1.3
+"""Times that something is longer than it is wide, from which on it is put with an end first into what is narrow."""
+
 CLOSE = 0.001
 """m, slack of heights."""
 
@@ -76,15 +79,15 @@ def spots_for(
     name: str,
     where: str,
     also: Sequence[Condition] = (),
-    hanging: bool = False,
+    hanging: Rotation | None = None,
 ) -> Iterator[Spot]:
     """Poses of an object's main body that make a placement true. Orientations in which it rests come first, those
     nearest to how it is held before others, each turned about the vertical.
 
     Args:
       also: further placements that are to be true there.
-      hanging: at these places the object keeps the orientation in which it hangs from the hand, turned about the
-        vertical, with its lowest point where it would stand: it falls over when it is let go.
+      hanging: at these places the object keeps the orientation in which it hangs from the hand, after this rotation
+        and turned about the vertical, with its lowest point where it would stand: it falls over when it is let go.
     """
     world.query.load(world.stage.snapshot(world.world))
     index = world.index(name)
@@ -118,7 +121,7 @@ def spots_for(
                 if any(np.linalg.norm(pos - other) < SPREAD for other in found):
                     continue
                 asked += 1
-                at, turn = _hanging(world, name, pos, new, angle) if hanging else (pos, new)
+                at, turn = (pos, new) if hanging is None else _hanging(world, name, pos, new, hanging, angle)
                 if not without_contact or _would_hold(world, without_contact, name, at, turn):
                     found.append(pos)
                     yield Spot(at, turn, bool(roofed[k]))
@@ -164,14 +167,28 @@ def grip_for(world: PlannedWorld, hand: int, name: str, spot: Spot) -> tuple[Vec
     return target, np.asarray(quat_multiply(turn, world.hand_quat(hand)), float), rotation
 
 
+def ends_down(world: PlannedWorld, name: str, hand: int) -> list[Rotation]:
+    """Rotations after which what a hand holds points down with an end, that away from the hand first: so it falls
+    through the mouth of what is narrower than it is long. None of what is not longer than wide."""
+    points = world.vertices(name)
+    points = points - points.mean(0)
+    axes = np.linalg.svd(points, full_matrices=False)[2]
+    along, across = (float(np.ptp(points @ axis)) for axis in axes[:2])
+    if along < LONGER * across:
+        return []
+    away = axes[0] if (world.com(name) - world.grip(hand)) @ axes[0] >= 0.0 else -axes[0]
+    return [turn_onto(end, -UP) for end in (away, -away)]
+
+
 def _hanging(
-    world: PlannedWorld, name: str, pos: Vector, quat: Float[np.ndarray, "4"], angle: float
+    world: PlannedWorld, name: str, pos: Vector, quat: Float[np.ndarray, "4"], tilt: Rotation, angle: float
 ) -> tuple[Vector, Float[np.ndarray, "4"]]:
-    """Pose of an object that is turned as it is now, but for an angle about the vertical, above where it would rest at
-    a pose: the middle of its box there, its lowest point as low."""
+    """Pose of an object that is turned as it is now, but for a tilt and an angle about the vertical, above where it
+    would rest at a pose: the middle of its box there, its lowest point as low."""
     own_pos, own_quat = world.pose(name)
     corners = (world.vertices(name) - own_pos) @ matrices_on_host(own_quat[None])[0]
-    turn = _yawed(own_quat, angle)
+    tilted = np.asarray(quat_multiply(np.asarray(matrix_to_quat(tilt), float), own_quat), float)
+    turn = _yawed(tilted, angle)
     there = corners @ matrices_on_host(quat[None])[0].T
     hung = corners @ matrices_on_host(turn[None])[0].T
     middle = pos[:2] + (there.min(0) + there.max(0))[:2] / 2 - (hung.min(0) + hung.max(0))[:2] / 2
