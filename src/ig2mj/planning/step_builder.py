@@ -206,14 +206,15 @@ class StepBuilder:
         return ""
 
     def _clear_out(self, container: str) -> None:
-        """Puts a container that can be carried onto open floor, where hands reach into it from all sides, if it is not
-        on the floor yet and this has not failed."""
-        if not container or self._domain.fixed(container) or container in self._held:
+        """Puts a container that can be carried, or is held, onto open floor, where hands reach into it from all sides,
+        if it is not on the floor yet; where this has failed, what is held onto the nearest support."""
+        if not container or self._domain.fixed(container):
             return
         room = self._facts.room(container)
         if not self._domain.graspable(container) or self._facts.holds("on_floor", container, room):
             return
         if self._failures(("grasp", container), ("place_on_floor", container, room)) >= CLEARED:
+            self._set_down(container)
             return
         self._take(container)
         self._put("place_on_floor", container, room)
