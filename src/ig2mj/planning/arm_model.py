@@ -11,16 +11,11 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from ig2mj.agents.base import ACTION_PERIOD, Controller
-from ig2mj.agents.fetch.controller import AHEAD, EASE, GAIN, POSTURE, FetchController
-from ig2mj.agents.fetch.figures import CHAIN, CHAIN_JOINTS, VELOCITY
+from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.kinematics import Chain, forward, inverse
-from ig2mj.agents.task_robot import TaskRobot
-from ig2mj.agents.urdf.controller import UrdfController
 from ig2mj.engine.view import Array
 from ig2mj.geometry.host_rotations import (
     matrix_to_quat,
@@ -32,7 +27,6 @@ from ig2mj.geometry.poses import quat_conjugate as conjugate
 from ig2mj.geometry.poses import quat_multiply as multiply
 from ig2mj.geometry.poses import quat_to_rotation_vector as rotation_vector
 from ig2mj.geometry.poses import rotation_vector_to_quat as from_rotation_vector
-from ig2mj.scene.scene import Scene
 
 PULL = 0.5
 """Share of what is left that a hand is asked to move and turn by in an agent step."""
@@ -207,37 +201,3 @@ class ArmModel:
 def _with_row(rows: Array, number: Array, row: Array) -> Array:
     """The same rows with another one at a place."""
     return jnp.asarray(rows).at[number].set(row)
-
-
-def model_of_arm(scene: Scene, controller: Controller, agent: int) -> ArmModel | None:
-    """That of a robot's arm; None: it has none with a hand, or its controller moves it in no known way."""
-    tables, name = scene.tables, scene.tables.agent_names[agent]
-    hands = np.flatnonzero(tables.hand_agent == agent)
-    if len(hands) != 1:
-        return None
-    if isinstance(controller, FetchController):
-        names = [f"{name}_{n}" for n in _FETCH_NAMES]
-        joints = np.array([tables.agent_joint_names.index(n) for n in names])
-        rest = controller.rest[CHAIN_JOINTS]
-        model = ArmModel(CHAIN, joints, rest, EASE, VELOCITY[CHAIN_JOINTS], (AHEAD, GAIN * ACTION_PERIOD), POSTURE)
-    elif isinstance(controller, UrdfController) and controller.arms and controller.arms[0] is not None:
-        arm = controller.arms[0]
-        names = [f"{name}_{n}" for n in arm.names]
-        joints = np.array([tables.agent_joint_names.index(n) for n in names])
-        model = ArmModel(arm.chain, joints, arm.rest, np.ones(len(joints)), arm.speed, (1.0, 1.0), 0.0)
-    else:
-        return None
-    robot = scene.agents[agent]
-    assert isinstance(robot, TaskRobot)
-    data = scene.start_data()
-    q = np.array([data.qpos[scene.model.joint(n).qposadr[0]] for n in names])
-    mujoco.mj_kinematics(scene.model, data)
-    palm, base = int(tables.hand_body[hands[0]]), scene.model.body(name).id
-    model.calibrate(data, base, palm, np.asarray(robot.hand_rays()[0].grasp_point, float), q)
-    return model
-
-
-_FETCH_NAMES = (
-    *("torso_lift_joint", "shoulder_pan_joint", "shoulder_lift_joint", "upperarm_roll_joint", "elbow_flex_joint"),
-    *("forearm_roll_joint", "wrist_flex_joint", "wrist_roll_joint"),
-)

@@ -18,12 +18,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.agents.base import ACTION_PERIOD, Controller
-from ig2mj.agents.fetch.controller import GAIN, FetchController
-from ig2mj.agents.fetch.robot import HAND as FETCH_HAND
+from ig2mj.agents.base import Controller
 from ig2mj.agents.kinematics import forward
 from ig2mj.agents.task_robot import TaskRobot
-from ig2mj.agents.urdf.controller import UrdfController
 from ig2mj.agents.urdf.grip import JawFrame, jaw_frame
 from ig2mj.agents.urdf.robot import UrdfRobot
 from ig2mj.geometry.host_rotations import (
@@ -35,6 +32,7 @@ from ig2mj.geometry.host_rotations import (
     quat_rotate_inverse,
     quat_to_rotation_vector,
 )
+from ig2mj.planning.arm_kinds import ArmKind
 from ig2mj.planning.arm_links import LinkSpheres, geom_spheres
 from ig2mj.planning.arm_model import FASTEST, PULL, TURN_FASTEST, ArmModel
 from ig2mj.planning.bodies import Direction, Rows, WheeledBody, goals_of_hand
@@ -51,15 +49,6 @@ EVERY = 4
 ASIDE = 0.6
 """m that a base would like to be from what its arm does; less than the arm's reach by half."""
 
-FETCH_TUCKED, FETCH_CARRY = (0.22, 0.12, 0.95), (0.42, 0.1, 1.15)
-"""m: grasp point of Fetch's empty hand at rest, pointing ahead, and of one that carries something; base's frame. So
-tucked, no link is farther from the axis than the base is; a hand that carries turns to where it takes hold, with its
-arm no farther to the sides."""
-
-FETCH_CARRYING = (0.3, 0.1)
-"""Greatest commands of driving and turning while Fetch holds something, of 1.07 m/s and 5.7 rad/s: a hand 0.7 m from
-the axis is at 0.4 m/s then. What is heavy is lost where a base turns faster."""
-
 
 class ArmBody(WheeledBody):
     """A base on wheels with one arm and a gripper. The base stands still while the hand moves. See `HandedBody`.
@@ -72,20 +61,20 @@ class ArmBody(WheeledBody):
     rises = (0.0, 0.0)
     lifts = np.inf
 
-    def __init__(self, scene: Scene, controller: Controller, agent: int, model: ArmModel):
+    def __init__(self, scene: Scene, controller: Controller, agent: int, kind: ArmKind, model: ArmModel):
         super().__init__(scene, controller, agent)
         robot = scene.agents[agent]
         self.stands = float(robot.stands) if isinstance(robot, TaskRobot) else 0.0
-        self.model, self._controller = model, controller
+        self.model, self._kind = model, kind
         self._grip, self.opening, self._spheres, self._corners = _gripper(
             scene, agent, int(self.hands[0]), self.grips[0]
         )
         self._at_rest = self._tucked()
         pos, quat = model.hand(self._at_rest[None])
         self.rest, self._rest_quat = pos, quat[0]
-        self.climbs = isinstance(controller, FetchController)
-        self.carrying = FETCH_CARRYING if self.climbs else self.carrying
-        self.carry = np.array([FETCH_CARRY]) if self.climbs else pos.copy()
+        self.climbs = kind.climbs
+        self.carrying = kind.carrying or self.carrying
+        self.carry = pos.copy() if kind.carry is None else np.array([kind.carry])
         chain, first = model.chain, model.chain.upright()
         low, high = (np.where(chain.sliding, v, 0.0) for v in (chain.lower, chain.upper))
         start = chain.part(first + 1)
@@ -100,10 +89,10 @@ class ArmBody(WheeledBody):
 
     def _tucked(self) -> Float[np.ndarray, "J"]:
         """The posture of the arm of an empty hand at rest."""
-        if not isinstance(self._controller, FetchController):
+        if self._kind.tucked is None:
             return self.model.rest
         quat = np.array(self.turned(0, UP, FORWARDS))
-        found = self.model.follow(self.model.rest, np.array([FETCH_TUCKED]), quat[None])
+        found = self.model.follow(self.model.rest, np.array([self._kind.tucked]), quat[None])
         return self.model.rest if found is None else found[-1]
 
     def arm_spheres(self, joints: Float[np.ndarray, "Q"], at_rest: bool) -> Float[np.ndarray, "S 4"]:
@@ -126,9 +115,9 @@ class ArmBody(WheeledBody):
             place = self._places(name)
             action[:, place] = np.where(moves[:, None], drive[:, place], 0.0)
         mine, move, turn = self._hand_step(senses, rows)
-        if isinstance(self._controller, FetchController):
+        if self._kind.drawn:
             move += self._carried_back(senses, moves & (rows["hand"] < 0))
-        self._act(action, senses, mine, move, turn)
+        self._kind.write(action, self._places, mine, (move, turn), self.model, senses.joints)
         held = senses.held[:, 0].any(1)
         closed = np.where((rows["close"] < 0) | ~mine, held, rows["close"] > 0)
         action[:, self._places(self._close)] = np.where(closed, -1.0, 1.0)[:, None]
@@ -160,23 +149,6 @@ class ArmBody(WheeledBody):
         ]
         turn *= np.minimum(1.0, TURN_FASTEST / np.maximum(np.asarray(length(turn)), 1e-6))[:, None]
         return mine, move, turn
-
-    def _act(self, action: np.ndarray, senses: Senses, mine: np.ndarray, move: np.ndarray, turn: np.ndarray) -> None:
-        """Writes the numbers of the action that move the arm."""
-        if isinstance(self._controller, FetchController):
-            share = GAIN * ACTION_PERIOD
-            scale = self._controller.stretch * share
-            control = FETCH_HAND
-            action[:, self._places(*control.move)] = np.clip(move / scale[:3], -1.0, 1.0)
-            action[:, self._places(*control.turn)] = np.clip(turn / scale[3:], -1.0, 1.0)
-            return
-        assert isinstance(self._controller, UrdfController) and senses.joints is not None
-        arm = self._controller.arms[0]
-        assert arm is not None
-        q = senses.joints[:, self.model.joints]
-        new = np.asarray(self.model.step(jnp.asarray(q, jnp.float32), jnp.asarray(move), jnp.asarray(turn)))
-        asked = np.where(mine[:, None], (new - q) / (arm.speed * ACTION_PERIOD), 0.0)
-        action[:, self._places(*arm.names)] = np.clip(asked, -1.0, 1.0)
 
     def turned(self, hand: int, fingers: Direction, palm: Direction) -> tuple[float, float, float, float]:
         """Of a gripper: `palm` is where it points, `fingers` is from one finger to the other."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ig2mj.agents.base import Controller
-from ig2mj.planning.arm_model import model_of_arm
+from ig2mj.planning.arm_kinds import arm_of
 from ig2mj.planning.arms import ArmBody
 from ig2mj.planning.bodies import Body, HoveringBody, WheeledBody
 from ig2mj.planning.steps import PlanningError
@@ -20,7 +20,7 @@ def body_of(scene: Scene, controller: Controller, agent: int = 0) -> Body:
     if "body_x" in names:
         return HoveringBody(scene, controller, agent)
     if {"forward", "turn_left"} <= set(names):
-        model = model_of_arm(scene, controller, agent)
-        return WheeledBody(scene, controller, agent) if model is None else ArmBody(scene, controller, agent, model)
+        arm = arm_of(scene, controller, agent)
+        return WheeledBody(scene, controller, agent) if arm is None else ArmBody(scene, controller, agent, *arm)
     name = scene.tables.agent_names[agent]
     raise PlanningError(f"robot '{name}' has no base that moves: primitives take one that drives or hovers")
