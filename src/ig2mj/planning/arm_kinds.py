@@ -8,7 +8,7 @@ Axes: W worlds, J joints of the arm, n numbers of an action.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import jax.numpy as jnp
 import mujoco
@@ -29,6 +29,7 @@ Places = Callable[..., Any]
 """Where numbers of these names are in an action."""
 
 
+@runtime_checkable
 class ArmKind(Protocol):
     """See the module's text.
 
