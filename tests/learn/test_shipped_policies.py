@@ -85,6 +85,9 @@ def test_a_run_becomes_a_policy_that_is_found_by_name(run, monkeypatch):
 def test_a_name_says_what_is_unusual():
     assert shipped.usual_name(made()) == "CookingMeat-state"
     assert shipped.usual_name(made(robot="fetch", grasping="physical")) == "CookingMeat-fetch-physical-state"
+    of_homes = made(robot="fetch")
+    of_homes.card["homes"] = ["birch", "cedar"]
+    assert shipped.usual_name(of_homes) == "CookingMeat-homes-fetch-state"
     assert shipped.usual_name(made(task="PointNavigation", robot="turtlebot", grasping="physical")) == "PointNavigation"
 
 

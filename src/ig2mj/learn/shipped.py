@@ -69,6 +69,7 @@ def usual_name(policy: Policy) -> str:
     depends = policy.card["depends"]
     task = find_task(depends["task"])
     parts = [task.name]
+    parts += ["homes"] * ("homes" in policy.card)
     parts += [depends["robot"]] * (depends["robot"] != next(iter(task.robots)))
     parts += [depends["grasping"]] * (depends["grasping"] != task.grasping)
     parts += ["state"] * (isinstance(task, Task) and depends["mode"] == "state")
