@@ -7,7 +7,7 @@ import pytest
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.planning import execution
-from ig2mj.planning.arm_kinds import FetchArm
+from ig2mj.planning.arm_kinds import FetchArmKind
 from ig2mj.planning.bodies import MOST, WheeledBody
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.planning.senses import Senses
@@ -42,9 +42,9 @@ def test_a_base_that_something_has_stopped_does_not_wait_for_the_limit(body, mon
 
 
 def test_what_a_hand_holds_is_turned_and_driven_slowly(body):
-    body.carrying = FetchArm.carrying
+    body.carrying = FetchArmKind.carrying
     ahead = execution.begin([[Phase(Base.DRIVE, xy=(5.0, 0.0))]]).rows
     behind = execution.begin([[Phase(Base.DRIVE, xy=(-5.0, 0.1))]]).rows
-    for held, forward, turn in ((False, MOST, MOST), (True, *(FetchArm.carrying or ()))):
+    for held, forward, turn in ((False, MOST, MOST), (True, *(FetchArmKind.carrying or ()))):
         assert body.command(senses(held=held), ahead)[0] == pytest.approx([forward, 0.0])
         assert body.command(senses(held=held), behind)[0] == pytest.approx([0.0, turn])

@@ -7,8 +7,9 @@ Axes: W worlds, J joints of the arm, n numbers of an action.
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import jax.numpy as jnp
 import mujoco
@@ -20,8 +21,7 @@ from ig2mj.agents.fetch.controller import AHEAD, EASE, GAIN, POSTURE, FetchContr
 from ig2mj.agents.fetch.figures import CHAIN, CHAIN_JOINTS, VELOCITY
 from ig2mj.agents.fetch.robot import HAND
 from ig2mj.agents.task_robot import TaskRobot
-from ig2mj.agents.urdf import controller as urdf
-from ig2mj.agents.urdf.controller import UrdfController
+from ig2mj.agents.urdf.controller import UrdfArm, UrdfController
 from ig2mj.planning.arm_model import ArmModel
 from ig2mj.scene.scene import Scene
 
@@ -29,8 +29,7 @@ Places = Callable[..., Any]
 """Where numbers of these names are in an action."""
 
 
-@runtime_checkable
-class ArmKind(Protocol):
+class ArmKind(abc.ABC):
     """See the module's text.
 
     Attributes:
@@ -41,16 +40,16 @@ class ArmKind(Protocol):
     """
 
     joints: Sequence[str]
-    climbs: bool
-    tucked: tuple[float, float, float] | None
-    carry: tuple[float, float, float] | None
-    carrying: tuple[float, float] | None
-    drawn: bool
+    climbs = drawn = False
+    tucked: tuple[float, float, float] | None = None
+    carry: tuple[float, float, float] | None = None
+    carrying: tuple[float, float] | None = None
 
+    @abc.abstractmethod
     def model(self, joints: Int[np.ndarray, "J"]) -> ArmModel:
         """`joints`: numbers of the arm's joints among those of all robots."""
-        ...
 
+    @abc.abstractmethod
     def write(
         self,
         action: Float[np.ndarray, "W n"],
@@ -66,22 +65,20 @@ class ArmKind(Protocol):
           moves: worlds in which the hand moves. by: m and rad (rotation vector) by which it is to move and turn in this
             agent step, base's frame. q: of all robots' joints.
         """
-        ...
 
 
-class FetchArm:
+class FetchArmKind(ArmKind):
     """Fetch's: the action has the gripper's displacement. So tucked, no link is farther from the axis than the base
     is; a hand that carries turns to where it takes hold, with its arm no farther to the sides. What is heavy is lost
     where a base turns faster than `carrying`: a hand 0.7 m from the axis is at 0.4 m/s then."""
 
-    joints: Sequence[str] = (
+    joints = (
         *("torso_lift_joint", "shoulder_pan_joint", "shoulder_lift_joint", "upperarm_roll_joint", "elbow_flex_joint"),
         *("forearm_roll_joint", "wrist_flex_joint", "wrist_roll_joint"),
     )
-    climbs, drawn = True, True
-    tucked: tuple[float, float, float] | None = (0.22, 0.12, 0.95)
-    carry: tuple[float, float, float] | None = (0.42, 0.1, 1.15)
-    carrying: tuple[float, float] | None = (0.3, 0.1)
+    climbs = drawn = True
+    tucked, carry = (0.22, 0.12, 0.95), (0.42, 0.1, 1.15)
+    carrying = (0.3, 0.1)
 
     def __init__(self, controller: FetchController):
         self._controller = controller
@@ -106,17 +103,11 @@ class FetchArm:
         action[:, places(*HAND.turn)] = np.clip(by[1] / scale[3:], -1.0, 1.0)
 
 
-class UrdfArm:
+class UrdfArmKind(ArmKind):
     """That of a robot from a URDF: the action has the speeds of joints, which the arm's model computes."""
 
-    climbs, drawn = False, False
-    tucked: tuple[float, float, float] | None = None
-    carry: tuple[float, float, float] | None = None
-    carrying: tuple[float, float] | None = None
-
-    def __init__(self, arm: urdf.UrdfArm):
-        self._arm = arm
-        self.joints: Sequence[str] = tuple(arm.names)
+    def __init__(self, arm: UrdfArm):
+        self._arm, self.joints = arm, tuple(arm.names)
 
     def model(self, joints: Int[np.ndarray, "J"]) -> ArmModel:
         """See `ArmKind.model`."""
@@ -142,10 +133,10 @@ class UrdfArm:
 
 def _of_urdf(controller: UrdfController) -> ArmKind | None:
     arm = controller.arms[0] if controller.arms else None
-    return None if arm is None else UrdfArm(arm)
+    return None if arm is None else UrdfArmKind(arm)
 
 
-KINDS: Mapping[type, Callable[[Any], ArmKind | None]] = {FetchController: FetchArm, UrdfController: _of_urdf}
+KINDS: Mapping[type, Callable[[Any], ArmKind | None]] = {FetchController: FetchArmKind, UrdfController: _of_urdf}
 """By class of the controller; None: the robot has no arm."""
 
 

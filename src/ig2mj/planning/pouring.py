@@ -46,7 +46,7 @@ TILTS = np.arange(np.deg2rad(10.0), np.deg2rad(171.0), FINE)
 """rad by which it may be turned."""
 
 DOSES, DOSE = 3, 0.02
-"""Turns in which what is wanted flows out, and litres of it where something is covered."""
+"""Turns in which what is needed flows out, and litres of it where something is covered."""
 
 CHECKED = np.deg2rad([30.0, 60.0, 90.0, 120.0, 150.0])
 """rad at which container and hand must have room, as far as it is turned."""
@@ -123,12 +123,12 @@ def _turned_over(world: PlannedWorld, step: Step, hand: int, number: int) -> Gen
     if number >= len(places):
         return f"the opening of {target} does not face upwards"
     motion = _Motion(world, name, hand, places[number])
-    litres_wanted = FILLED * world.domain.litres(target) or DOSE
-    direction = next((d for d in motion.directions() if motion.has_room(d, litres_wanted)), None)
+    needed = FILLED * world.domain.litres(target) or DOSE
+    direction = next((d for d in motion.directions() if motion.has_room(d, needed)), None)
     if direction is None:
         return f"there is no room to turn {name} over above {target}"
     said, tilt = "", 0.0
-    dose = litres_wanted / DOSES
+    dose = needed / DOSES
     while tilt < TILTS[-1]:
         goal = motion.tilt_for(direction, tilt, dose)
         if (yield motion.program(direction, tilt, goal, keeps)):
@@ -208,10 +208,10 @@ class _Motion:
     def _rotation(self, direction: Vector, tilt: float) -> Rotation:
         return turn_onto(UP, np.cos(tilt) * UP + np.sin(tilt) * direction) @ self._upright
 
-    def has_room(self, direction: Vector, wanted: float) -> bool:
+    def has_room(self, direction: Vector, needed: float) -> bool:
         """Whether the hand with the container has room, and reaches, at all tilts up to where so many litres have
         flowed out."""
-        last = self.tilt_for(direction, 0.0, wanted)
+        last = self.tilt_for(direction, 0.0, needed)
         return all(self._free(self.pose(direction, float(tilt))) for tilt in (*CHECKED[last > CHECKED], last))
 
     def _free(self, pose: _Pose) -> bool:

@@ -88,7 +88,7 @@ def supplies(facts: Facts, condition: Condition, required: Sequence[Condition] =
     too little of the substance.
 
     Args:
-      condition: that is to become true. required: conditions that are to hold in the end: what they want in a
+      condition: that is to become true. required: conditions that are to hold in the end: what they ask for in a
         container is not poured out of it.
     """
     domain, (name, substance) = facts.domain, condition.arguments
@@ -106,11 +106,11 @@ def supplies(facts: Facts, condition: Condition, required: Sequence[Condition] =
     able = [y for y in others if _spare(facts, y, substance, required) >= missing]
     found += [Supply("pour", y) for y in able]
     if substance == WATER:
-        jugs = [y for y in others if y in domain.fillable and y not in able and not _wanted(y, WATER, required)]
+        jugs = [y for y in others if y in domain.fillable and y not in able and not _asked_of(y, WATER, required)]
         found += [Supply("pour", y, tap) for y in jugs for tap in domain.taps]
 
     def rank(supply: Supply) -> tuple[bool, int, bool, float]:
-        kept = supply.primitive == "pour" and bool(_wanted(supply.source, substance, required))
+        kept = supply.primitive == "pour" and bool(_asked_of(supply.source, substance, required))
         order = -domain.litres(supply.source) if supply.tap else _far(facts, supply.source, name)
         return bool(supply.tap), _steps(facts, name, supply), kept, order
 
@@ -142,11 +142,11 @@ def _spare(facts: Facts, name: str, substance: str, required: Sequence[Condition
     """Litres that may be poured out of a container."""
     if endless(facts, name, substance):
         return np.inf
-    kept = [required_litres(facts, c) for c in _wanted(name, substance, required)]
+    kept = [required_litres(facts, c) for c in _asked_of(name, substance, required)]
     return litres(facts, name, substance) - max(kept, default=0.0)
 
 
-def _wanted(name: str, substance: str, required: Collection[Condition]) -> list[Condition]:
+def _asked_of(name: str, substance: str, required: Collection[Condition]) -> list[Condition]:
     return [c for c in required if c.value and c.predicate in RECEIVED[:2] and c.arguments == (name, substance)]
 
 

@@ -30,7 +30,6 @@ class WithLargeConstants:
         donated = (donate_argnums,) if isinstance(donate_argnums, int) else tuple(donate_argnums)
         self.plain: Any = jax.jit(function, donate_argnums=donated, **options)
         self._constants: list[Any] | None = None
-        self._known: dict[int, int] = {}
         self._originals: list[Any] = []
 
         def program(constants: list[Any], *args: Any) -> Any:
@@ -60,7 +59,6 @@ class WithLargeConstants:
 
         constants = self.plain.trace(*args).jaxpr.consts
         self._originals = [] if _is_spread(args) else [value for value in constants if _is_large(value)]
-        self._known = {id(value): k for k, value in enumerate(self._originals)}
         with jax.ensure_compile_time_eval():  # the call may be part of another program
             self._constants = [jax.numpy.asarray(value) for value in self._originals]
 
@@ -69,8 +67,9 @@ class WithLargeConstants:
         import jax.extend.core
 
         traced = self.plain.trace(*args)
-        known = [constants[self._known[id(c)]] if id(c) in self._known else c for c in traced.jaxpr.consts]
-        closed = jax.extend.core.ClosedJaxpr(traced.jaxpr.jaxpr, known)
+        passed = {id(value): constant for value, constant in zip(self._originals, constants, strict=True)}
+        values = [passed.get(id(value), value) for value in traced.jaxpr.consts]
+        closed = jax.extend.core.ClosedJaxpr(traced.jaxpr.jaxpr, values)
         found = jax.extend.core.jaxpr_as_fun(closed)(*jax.tree.leaves(args))
         return jax.tree.unflatten(traced.out_tree, found)
 
@@ -80,9 +79,7 @@ def _is_spread(args: tuple[Any, ...]) -> bool:
     import jax
 
     shardings = [getattr(a, "sharding", None) for a in jax.tree.leaves(args)]
-    return any(
-        len(s.device_set) > 1 for s in shardings if isinstance(s, jax.sharding.NamedSharding) and s.mesh.size > 1
-    )
+    return any(isinstance(s, jax.sharding.NamedSharding) and s.mesh.size > 1 for s in shardings)
 
 
 def _is_large(value: Any) -> bool:

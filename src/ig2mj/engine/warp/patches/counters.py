@@ -77,7 +77,8 @@ class AtOnePlace:
         """Where the copies on a device lie, `room` bytes."""
         blocks = self._places.setdefault(ordinal, [])
         if not blocks or blocks[-1].size < room:  # smaller ones stay: captured graphs use them
-            blocks.append(wp.zeros(room, dtype=wp.uint8, device=wp.get_cuda_device(ordinal)))
+            # not zeros, which Warp's stream would write, perhaps after the first copy into it on XLA's
+            blocks.append(wp.empty(room, dtype=wp.uint8, device=wp.get_cuda_device(ordinal)))
         return blocks[-1].ptr
 
 
