@@ -73,8 +73,9 @@ def throughput(args: argparse.Namespace) -> list[dict[str, Any]]:
 
 
 def axes(args: argparse.Namespace) -> list[dict[str, Any]]:
-    """Without randomization, with each axis, with all, and without it again."""
-    sets = [[], *([axis] for axis in AXES), list(AXES), []]
+    """Without randomization, with each axis unless only all together are asked for, with all, and without again."""
+    each: list[list[str]] = [] if args.together else [[axis] for axis in AXES]
+    sets = [[], *each, list(AXES), []]
     return [{"what": "axes", "task": args.tasks[0], "axes": s, "turn": k} for k, s in enumerate(sets)]
 
 
@@ -179,6 +180,7 @@ def main() -> None:
     parser.add_argument("--tasks", nargs="+", default=["CookingMeat", "GraspingBook"])
     parser.add_argument("--rows", type=int, default=ROWS)
     parser.add_argument("--worlds", type=int, default=8192, help="of throughput: all worlds together")
+    parser.add_argument("--together", action="store_true", help="of axes: only none and all of them")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=pathlib.Path)
     args = parser.parse_args()
