@@ -171,8 +171,21 @@ def test_rows_that_are_all_alike_are_written_as_they_can_be_read(sizes, monkeypa
             read_npz(packed(**arrays))
 
 
-def test_what_packs_as_others_do_is_written_as_numpy_writes_it():
+def test_what_packs_as_others_do_is_written_as_numpy_writes_it_without_its_64_bit_sizes():
+    """NumPy keeps room for them before every array: 20 bytes."""
     arrays = {"a": np.arange(999.0), "b": np.zeros((3, 4), bool), "c": np.array("text")}
-    out = io.BytesIO()
+    out, usual = io.BytesIO(), packed(**arrays)
     write_npz(out, arrays)
-    assert out.getvalue() == packed(**arrays)
+    assert len(out.getvalue()) == len(usual) - 20 * len(arrays)
+    with zipfile.ZipFile(out) as ours, zipfile.ZipFile(io.BytesIO(usual)) as theirs:
+        assert [(e.filename, e.CRC, e.compress_size) for e in ours.infolist()] == [
+            (e.filename, e.CRC, e.compress_size) for e in theirs.infolist()
+        ]
+
+
+def test_an_array_beyond_32_bits_is_written_with_64_bit_sizes(monkeypatch):
+    monkeypatch.setattr(zipfile, "ZIP64_LIMIT", 2**20)
+    large = np.random.default_rng(0).integers(0, 256, 2**20 + 1, np.uint8)
+    out = io.BytesIO()
+    write_npz(out, {"large": large, "small": np.zeros(3)})
+    assert (read_npz(out.getvalue())["large"] == large).all()

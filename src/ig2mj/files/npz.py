@@ -97,8 +97,10 @@ def _write(stream: IO[bytes], arrays: Mapping[str, np.ndarray], stored: Containe
         for name, array in arrays.items():
             entry = zipfile.ZipInfo(f"{name}.npy")
             entry.compress_type = zipfile.ZIP_STORED if name in stored else zipfile.ZIP_DEFLATED
-            with archive.open(entry, "w", force_zip64=True) as opened:
-                np.lib.format.write_array(opened, np.asanyarray(array), allow_pickle=False)
+            array = np.asanyarray(array)
+            entry.file_size = array.nbytes + LONGEST_HEADER  # from which zipfile knows whether 64-bit sizes are needed
+            with archive.open(entry, "w") as opened:
+                np.lib.format.write_array(opened, array, allow_pickle=False)
         return sum(entry.file_size for entry in archive.infolist())
 
 

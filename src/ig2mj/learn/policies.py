@@ -27,7 +27,7 @@ from ig2mj.agents.registry import ROBOTS, is_robot_folder
 from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError, InputError, PolicyMismatch
 from ig2mj.files.content import decode_json
-from ig2mj.files.npz import read_npz
+from ig2mj.files.npz import read_npz, write_npz
 from ig2mj.files.unfinished import unfinished
 from ig2mj.learn.action_distributions import mode, sample
 from ig2mj.learn.checkpoints import refuse_difference
@@ -222,7 +222,7 @@ class Policy:
             scales = {"mean": self.mean, "deviation": self.deviation}
             if self.hidden is not None:
                 scales |= dict(zip(HIDDEN, self.hidden, strict=True))
-            np.savez_compressed(f, **{CARD: card, **scales, **half})  # pyright: ignore[reportArgumentType]
+            write_npz(f, {CARD: card, **scales, **half})
         partial.replace(path)
 
     @classmethod
