@@ -131,3 +131,20 @@ def test_a_bump_is_felt_and_the_same_readings_drop_out(tiny_home_folder):
         assert both.sum() > 60, name
         np.testing.assert_array_equal(lost["native"][name][both], lost["warp"][name][both], err_msg=name)
         assert lost["native"][name][both].mean() == pytest.approx(0.3, abs=0.13), name
+
+
+def test_drawn_lights_cameras_and_materials_look_alike():
+    """By day, in a home with a lamp, whose light comes behind all others in the model; and with cameras that are drawn
+    a few centimetres back, inside of the robot's head."""
+    found = {}
+    for engine in ("native", "warp"):
+        env = ig2mj.make(
+            "GraspingBook", robot="fetch", worlds=6, engine=engine, pool_size=2, observations=("rgb", "depth"),
+            looks="day", randomize=("lights", "camera", "materials"),
+        )  # fmt: skip
+        found[engine] = {name: np.asarray(value).astype(float) for name, value in env.reset(0).obs.items()}
+    dark, bright = sorted(found["native"]["rgb"].mean((1, 2, 3)))[::5]
+    assert bright > dark + 20, "lights differ between worlds"
+    for world in range(6):
+        rgb, depth = (np.abs(found["native"][name][world] - found["warp"][name][world]) for name in ("rgb", "depth"))
+        assert rgb.mean() < 6 and np.median(depth) < 3e-3, world

@@ -175,4 +175,4 @@ def test_mistakes_are_typed(world):
 
 def test_images_that_opengl_cannot_hold_are_refused_with_their_size(world):
     with pytest.raises(EngineError, match="cannot render images of 60000x60000 pixels"):
-        Canvas(world.engine.scene.model.__copy__(), 60000, 60000, GROUPS, ())
+        Canvas(world.engine.scene.model.__copy__(), 60000, 60000, GROUPS, (), np.zeros(0, int))

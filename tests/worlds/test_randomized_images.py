@@ -6,13 +6,15 @@ import types
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 
 from ig2mj.scene.scene import load_scene
 from ig2mj.sensors.base import Space
 from ig2mj.sensors.noise import noisy
-from ig2mj.sensors.shading import FOV_PER_WORLD, LIGHTS_PER_WORLD, limit_light
+from ig2mj.sensors.render_model import CAMERA_LIGHT, SPARE_NAME, drawn_lights
+from ig2mj.sensors.shading import FOV_PER_WORLD, lights_per_world, limit_light
 from ig2mj.worlds.draw import SPARE_LIGHTS
 from ig2mj.worlds.random_streams import episode_keys
 from ig2mj.worlds.randomization import Randomization, kind_of_material, quat_of
@@ -88,5 +90,23 @@ def test_the_kernel_takes_what_differs_between_worlds(monkeypatch):
     """Every line that is changed for it is in MuJoCo Warp's kernel exactly once."""
     made = []
     monkeypatch.setattr("ig2mj.sensors.shading.defined", lambda name, text, globals: lambda *_: made.append(text))
-    limit_light(types.SimpleNamespace(), 3, changes=(*LIGHTS_PER_WORLD, *FOV_PER_WORLD))
-    assert made[0].count("M_NLIGHT - 1") == 3 and "wide * ray_dir_local_cam[0]" in made[0]
+    limit_light(types.SimpleNamespace(), 3, changes=(*lights_per_world(2), *FOV_PER_WORLD))
+    assert made[0].count("light_diffuse.shape[0], 2]") == 3 and "wide * ray_dir_local_cam[0]" in made[0]
+
+
+def test_each_light_of_an_image_follows_its_own_draw():
+    """MuJoCo orders lights by body: those that are added to the world come before a lamp's, and behind the world's."""
+    scene = mujoco.MjSpec()
+    lamp = scene.worldbody.add_body(name="lamp")
+    lamp.add_light(name="bulb")
+    scene.worldbody.add_light(name="sun")
+    model = scene.compile()
+    assert [model.light(k).name for k in range(2)] == ["sun", "bulb"]
+    for name in ("fill", *(SPARE_NAME.format(k) for k in range(SPARE_LIGHTS)), CAMERA_LIGHT):
+        scene.worldbody.add_light(name=name)
+    scene.body("lamp").add_light(name="glow")
+    host = scene.compile()
+    found = dict(zip((host.light(k).name for k in range(host.nlight)), drawn_lights(host, model), strict=True))
+    spares = {SPARE_NAME.format(k): 3 + k for k in range(SPARE_LIGHTS)}
+    assert found == {"sun": 1, "bulb": 2, "fill": 1, "glow": 1, CAMERA_LIGHT: 0, **spares}
+    assert set(drawn_lights(host, mujoco.MjSpec().compile())) == {0, *(1 + k for k in range(SPARE_LIGHTS))}

@@ -43,13 +43,13 @@ from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, mergeable, rigid_
 from ig2mj.sensors.particle_slots import fill_slots, slot_kinds
 from ig2mj.sensors.ray_cameras import sectors_of, set_rays, set_rows
 from ig2mj.sensors.render_kernels import launches_of_images
-from ig2mj.sensors.render_model import BACKGROUND, make_render_model, mean_colours
+from ig2mj.sensors.render_model import BACKGROUND, CAMERA_LIGHT, drawn_lights, make_render_model, mean_colours
 from ig2mj.sensors.slots import Slots
 from ig2mj.sensors.texture_filter import fit_textures
 from ig2mj.sensors.tints import STATES, SWITCHED_ON, UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
-from ig2mj.worlds.draw import SPARE_LIGHTS, Draw
+from ig2mj.worlds.draw import Draw
 
 TILE = 8
 """Pixels a side of what a block of 64 threads sees: a third faster than rows of 64 pixels."""
@@ -136,8 +136,10 @@ class BatchCamera:
         self._plan(host)
         with models_put() as put:
             self._model = mjx.put_model(host, own_device(), impl="warp")
-        if self._lit:  # the last light only carries the colour of the one at the camera
-            self._model = self._model.replace(light_active=self._model.light_active.at[-1].set(False))
+        self._draw_of_light = drawn_lights(host, engine.scene.model)
+        self._camera_light = host.light(CAMERA_LIGHT).id if self._lit else -1
+        if self._lit:  # it only carries a colour
+            self._model = self._model.replace(light_active=self._model.light_active.at[self._camera_light].set(False))
         if self._zooms:
             self._model = self._model.replace(cam_fovy=jnp.ones_like(self._model.cam_fovy))
         self._merged = self._merge(groups) if merge_meshes and mergeable(host) and not pins.obstacles() else None
@@ -201,9 +203,9 @@ class BatchCamera:
     @property
     def _changes(self) -> list[tuple[str, str]]:
         """Of the kernel, for what differs between worlds."""
-        from ig2mj.sensors.shading import FOV_PER_WORLD, LIGHTS_PER_WORLD
+        from ig2mj.sensors.shading import FOV_PER_WORLD, lights_per_world
 
-        return [*(LIGHTS_PER_WORLD if self._lit else ()), *(FOV_PER_WORLD if self._zooms else ())]
+        return [*(lights_per_world(self._camera_light) if self._lit else ()), *(FOV_PER_WORLD if self._zooms else ())]
 
     def _merge(self, groups: Sequence[int]) -> Tables | None:
         """Hides the geoms that merged meshes show, and invisible ones, from the ray caster's boxes; None where
@@ -436,24 +438,18 @@ class BatchCamera:
             colour = jnp.ones((self.engine.num_worlds, 1, 3)) if draw.light_colour is None else draw.light_colour
             of_lights = jnp.asarray(self._of_lights(colour))
             if draw.light_colour is None:  # no spare ones
-                of_lights = of_lights.at[:, -1 - SPARE_LIGHTS : -1].set(0.0)
-            own, last = of_lights[:, :-1], of_lights[:, -1:]
+                of_lights = of_lights.at[:, self._draw_of_light > self.engine.scene.model.nlight].set(0.0)
+            at_camera = np.arange(self._host.nlight)[:, None] == self._camera_light
             for name in ("light_diffuse", "light_specular", "light_ambient"):
-                found[name] = jnp.concatenate([getattr(self._model, name)[:-1] * own, last], axis=1)
+                found[name] = jnp.where(at_camera, of_lights, getattr(self._model, name) * of_lights)
         if self._zooms and draw.camera_slope is not None:
             wide = jnp.ones((self.engine.num_worlds, self._host.ncam))
             found["cam_fovy"] = wide.at[:, np.array(self.cameras, int)].set(draw.camera_slope[:, None])
         return found
 
     def _of_lights(self, drawn: Float[Array, "W N k"]) -> Float[Array, "W L k"]:
-        """What is drawn of lights, in the order of the render model's: the home's, what looks add, spare ones, that at
-        the camera."""
-        known, count = self.engine.scene.model.nlight, self._host.nlight
-        at = np.zeros(count, int)
-        if drawn.shape[1] > 1:
-            at[:known] = 1 + np.arange(known)
-            at[known:] = 1  # as the home's first
-            at[-1 - SPARE_LIGHTS :] = [*(1 + known + np.arange(SPARE_LIGHTS)), 0]
+        """What is drawn of lights, in the order of the render model's."""
+        at = self._draw_of_light if drawn.shape[1] > 1 else np.zeros(self._host.nlight, int)
         return drawn[:, at]
 
     def _objects(self, geom: Int[Array, "W N"], slots: Slots) -> Int[Array, "W N"]:

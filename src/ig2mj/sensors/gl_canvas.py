@@ -8,15 +8,16 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from jaxtyping import Int
 
 from ig2mj.process.opengl import images_of, use_opengl
 from ig2mj.sensors.images import NOTHING
-from ig2mj.sensors.render_model import BACKGROUND, SPARE_DIRECTIONS, SPARE_LIGHT
+from ig2mj.sensors.render_model import BACKGROUND, NEAR, SPARE_DIRECTIONS, SPARE_LIGHT
 from ig2mj.sensors.slots import Slots
 from ig2mj.worlds.draw import SPARE_LIGHTS
 
-NEAR, FAR = 0.01, 100.0
-"""m: planes of the view's frustum. MuJoCo's own near plane grows with the scene; a hand before the eye would be cut."""
+FAR = 100.0
+"""m: far plane of the view's frustum."""
 
 _FLAGS_OFF = (
     mujoco.mjtRndFlag.mjRND_REFLECTION,
@@ -36,12 +37,14 @@ class Canvas:
         height: int,
         groups: np.ndarray,
         slots: Sequence[mujoco.mjtGeom],
+        draw_of_light: Int[np.ndarray, "L"],
         shadows: bool = False,
     ):
         """Starts OpenGL.
 
         Args:
           model: to draw; its `vis` is changed. groups: [6] which geom groups are drawn. slots: types of shapes.
+          draw_of_light: `ig2mj.sensors.render_model.drawn_lights` of the model.
 
         Raises:
           MissingDependencyError: no OpenGL without a display works here.
@@ -51,6 +54,7 @@ class Canvas:
         from mujoco.rendering.classic import gl_context
 
         self._model, self._size, self._kinds = model, (height, width), tuple(slots)
+        self._draw_of_light = draw_of_light
         size = model.vis.global_
         size.offwidth, size.offheight = max(width, size.offwidth), max(height, size.offheight)
         model.vis.quality.offsamples = 0  # a pixel sees one geom, at its centre
@@ -100,13 +104,12 @@ class Canvas:
     def _vary(self, colour: np.ndarray, quat: np.ndarray) -> None:
         """Colours and turns the scene's lights, and adds the spare ones that are on."""
         scene = self._scene
-        own = [light for light in scene.lights[: scene.nlight] if not light.headlight]
         for light in scene.lights[: scene.nlight]:
-            at = 0 if light.headlight else 1 + min(light.id if light.id >= 0 else 0, len(own) - 1)
+            at = 0 if light.headlight else int(self._draw_of_light[light.id])
             if not light.headlight:
-                light.dir = _turned(quat[min(at, len(colour) - SPARE_LIGHTS - 1)], light.dir)
+                light.dir = _turned(quat[at], light.dir)
             for name in ("ambient", "diffuse", "specular"):
-                setattr(light, name, getattr(light, name) * colour[min(at, len(colour) - SPARE_LIGHTS - 1)])
+                setattr(light, name, getattr(light, name) * colour[at])
         for k, direction in enumerate(SPARE_DIRECTIONS):
             at = len(colour) - SPARE_LIGHTS + k
             if not colour[at].any():

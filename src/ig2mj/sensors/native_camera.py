@@ -29,7 +29,7 @@ from ig2mj.scene.scene import PLAIN
 from ig2mj.sensors.gl_canvas import Canvas
 from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, camera_id, check_request
 from ig2mj.sensors.particle_slots import fill_slots, slot_kinds
-from ig2mj.sensors.render_model import mean_colours
+from ig2mj.sensors.render_model import drawn_lights, mean_colours
 from ig2mj.sensors.slots import Slots
 from ig2mj.sensors.tints import STATES, SWITCHED_ON, UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
@@ -201,7 +201,9 @@ class NativeCamera:
         lights: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
         if self._canvas is None:
-            self._canvas = Canvas(self._drawn, self.width, self.height, self._visible, self._kinds, self._shadows)
+            of_lights = drawn_lights(self._drawn, self.engine.scene.model)
+            size = self.width, self.height
+            self._canvas = Canvas(self._drawn, *size, self._visible, self._kinds, of_lights, self._shadows)
         keep = data.cam_xpos[camera].copy(), data.cam_xmat[camera].copy()
         try:
             if pose is not None:

@@ -25,6 +25,7 @@ from jaxtyping import Bool
 from mujoco.mjx.third_party.mujoco_warp._src import bvh, ray
 
 from ig2mj.sensors.merged_meshes import MESH, Tables
+from ig2mj.sensors.render_model import NEAR
 from ig2mj.sensors.shading import limit_light
 
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)
@@ -50,13 +51,14 @@ def use_merged(
     Args:
       contexts: of MuJoCo Warp, of cameras of the render model, made with `tables.absorbed` in no group that is seen.
       robots: geoms that move through the home together. The tree of boxes keeps the shape that it has when it is made,
-        so that they have a branch of their own.
+        so that they have a branch of their own. Their surfaces are not there when seen from behind or from nearer than
+        `NEAR`, as in OpenGL: a camera that is drawn a little further back than the robot's sees through its head.
       changes: of the kernel (`limit_light`).
     """
     assert host.nflex == 0, "flexes' arrays carry the tables"
 
     def make_cast_ray(geom_ray_types: tuple[int, ...], first_hit: bool = False) -> wp.Function:
-        return _cast_ray(geom_ray_types, first_hit, host.ngeom, host.nmesh, tables)
+        return _cast_ray(geom_ray_types, first_hit, host.ngeom, host.nmesh, tables, bool(robots.any()))
 
     data = mujoco.MjData(host)
     mujoco.mj_forward(host, data)
@@ -82,7 +84,7 @@ def use_merged(
             sizes = np.concatenate([context.mesh_bounds_size.numpy()[: host.nmesh].reshape(-1, 3), half])
             context.mesh_bounds_size = wp.array(sizes.astype(np.float32), dtype=wp.vec3)
             context.flex_geom_flexid = wp.array(tables.face_geom, dtype=int)
-            rows = np.concatenate([tables.geom_face, tables.geom_mesh, tables.part_face])
+            rows = np.concatenate([tables.geom_face, tables.geom_mesh, tables.part_face, robots])
             context.flex_geom_edgeid = wp.array(rows.astype(np.int32), dtype=int)
             context.geom_ray_types = tuple(sorted({*context.geom_ray_types, MESH}))
             bvh.build_scene_bvh(as_merged, data, context, nworld)
@@ -90,8 +92,11 @@ def use_merged(
 
 
 @no_type_check
-def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, known: Tables) -> wp.Function:
+def _cast_ray(
+    kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, known: Tables, robots: bool
+) -> wp.Function:
     """The function for the kinds of geoms that have boxes. With `first_hit` any hit nearer than `max_dist` will do.
+    `robots`: there are some.
 
     Upstream's arguments are kept; two arrays of flexes, of which there are none, hold the tables of merged meshes.
     """
@@ -99,6 +104,7 @@ def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, k
     still, garden = known.still, known.garden
     last = nmesh + len(known.parts) - 1
     last_face = int(known.part_face[-1])
+    of_robots = 2 * ngeom + len(known.part_face)
     boxes = len(known.indoors)
     corners = wp.types.vector(length=max(6 * boxes, 1), dtype=float)(*(known.indoors.ravel() if boxes else (0.0,)))
     primitives = any(kind in kinds for kind in (PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX))
@@ -172,11 +178,18 @@ def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, k
             v = float(0.0)
             f = int(-1)
             merged = int(-1)
+            behind = cull_backfaces
+            skipped = float(0.0)
+            if wp.static(robots):
+                if tables[wp.static(of_robots) + geom] != 0:
+                    behind = True
+                    skipped = wp.static(NEAR)
+            start = origin + skipped * direction
             if wp.static(MESH in kinds):
                 if kind == wp.static(MESH):
                     which = geom_dataid[worldid % geom_dataid.shape[0], geom]
                     d, n, u, v, f, merged = ray.ray_mesh_with_bvh(
-                        mesh_bvh_id, which, pos, mat, origin, direction, reach, cull_backfaces
+                        mesh_bvh_id, which, pos, mat, start, direction, reach, behind
                     )
                     if d >= 0.0 and merged >= wp.static(nmesh):
                         geom = face_geom[tables[wp.static(2 * ngeom - nmesh) + merged] + f]
@@ -187,24 +200,26 @@ def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, k
                     size = geom_size[worldid % geom_size.shape[0], geom]
                     if wp.static(PLANE in kinds):
                         if kind == wp.static(PLANE):
-                            d, n = ray.ray_plane(pos, mat, size, origin, direction)
+                            d, n = ray.ray_plane(pos, mat, size, start, direction)
                     if wp.static(SPHERE in kinds):
                         if kind == wp.static(SPHERE):
-                            d, n = ray.ray_sphere(pos, size[0] * size[0], origin, direction)
+                            d, n = ray.ray_sphere(pos, size[0] * size[0], start, direction)
                     if wp.static(CAPSULE in kinds):
                         if kind == wp.static(CAPSULE):
-                            d, n = ray.ray_capsule(pos, mat, size, origin, direction)
+                            d, n = ray.ray_capsule(pos, mat, size, start, direction)
                     if wp.static(ELLIPSOID in kinds):
                         if kind == wp.static(ELLIPSOID):
-                            d, n = ray.ray_ellipsoid(pos, mat, size, origin, direction)
+                            d, n = ray.ray_ellipsoid(pos, mat, size, start, direction)
                     if wp.static(CYLINDER in kinds):
                         if kind == wp.static(CYLINDER):
-                            d, n = ray.ray_cylinder(pos, mat, size, origin, direction)
+                            d, n = ray.ray_cylinder(pos, mat, size, start, direction)
                     if wp.static(BOX in kinds):
                         if kind == wp.static(BOX):
-                            d, _sides, n = ray.ray_box(pos, mat, size, origin, direction)
-            if cull_backfaces and d >= 0.0 and wp.dot(direction, n) > 0.0:
+                            d, _sides, n = ray.ray_box(pos, mat, size, start, direction)
+            if behind and d >= 0.0 and wp.dot(direction, n) > 0.0:
                 d = -1.0
+            if d >= 0.0:
+                d = d + skipped
             if wp.static(first_hit):
                 if d >= 0.0 and d < dist:
                     return geom, d, n, u, v, f, merged

@@ -20,6 +20,10 @@ from ig2mj.worlds.draw import SPARE_LIGHTS
 BACKGROUND = (0.86, 0.90, 0.94, 1.0)
 """rgba where nothing is hit."""
 
+NEAR = 0.01
+"""m: robots are not seen from nearer. MuJoCo's own near plane grows with the scene; a hand before the eye would be
+cut."""
+
 NOWHERE = (0.0, 0.0, -50.0)
 """Metres, world frame: where slots are that show nothing."""
 
@@ -32,6 +36,9 @@ SPARE_DIRECTIONS = ((0.55, 0.3, -0.78), (-0.5, -0.35, -0.79))
 
 assert len(SPARE_DIRECTIONS) == SPARE_LIGHTS
 
+SPARE_NAME, CAMERA_LIGHT = "ig2mj/spare_light_{}", "ig2mj/camera_light"
+"""Names of those lights, and of the one whose colour is that of the light at the camera."""
+
 
 def make_render_model(
     scene: Scene, slots: Sequence[mujoco.mjtGeom], cameras: Sequence[str] = (), looks: str = PLAIN, lights: bool = False
@@ -41,7 +48,8 @@ def make_render_model(
     Args:
       slots: types of their geoms.
       cameras: names of cameras that are added behind the scene's own, for poses that are given with each image.
-      lights: behind all others come `SPARE_LIGHTS`, and one more whose colour is that of the light at the camera.
+      lights: adds `SPARE_LIGHTS`, and one more whose colour is that of the light at the camera. A model's lights are in
+        the order of their bodies, so that lamps come behind these (`drawn_lights`).
 
     Raises:
       EngineError: the scene on disk is no longer the one that was loaded.
@@ -66,8 +74,13 @@ def make_render_model(
         )
     for name in cameras:
         body.add_camera(name=name)
-    for direction in (*SPARE_DIRECTIONS, (0.0, 0.0, -1.0)) if lights else ():
+    added = [
+        *((SPARE_NAME.format(k), axis) for k, axis in enumerate(SPARE_DIRECTIONS)),
+        (CAMERA_LIGHT, (0.0, 0.0, -1.0)),
+    ]
+    for name, direction in added if lights else ():
         spec.worldbody.add_light(
+            name=name,
             type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
             dir=list(direction),
             diffuse=list(SPARE_LIGHT),
@@ -80,6 +93,26 @@ def make_render_model(
     if model.ngeom < known.ngeom + len(slots) or (model.geom_bodyid[: known.ngeom] != known.geom_bodyid).any():
         raise EngineError(f"scene '{scene.name}' in {scene.folder} changed since it was loaded (load it again)")
     return model
+
+
+def drawn_lights(host: mujoco.MjModel, scene: mujoco.MjModel) -> Int[np.ndarray, "L"]:
+    """For each light of a scene's render model, which of what is drawn for lights (`ig2mj.worlds.draw.Draw`) is its.
+
+    A light that looks add shares the draw of the scene's first light, or that of the light at the camera where the
+    scene has none. A body's own lights come before those that looks add to it.
+    """
+    found, own = np.full(host.nlight, 1 if scene.nlight else 0), 1 + np.arange(scene.nlight)
+    for body in np.unique(scene.light_bodyid):
+        numbers = own[scene.light_bodyid == body]
+        found[np.flatnonzero(host.light_bodyid == body)[: len(numbers)]] = numbers
+    for light in range(host.nlight):
+        name = host.light(light).name
+        if name == CAMERA_LIGHT:
+            found[light] = 0
+        for k in range(SPARE_LIGHTS):
+            if name == SPARE_NAME.format(k):
+                found[light] = 1 + scene.nlight + k
+    return found
 
 
 def mean_colours(model: mujoco.MjModel, geoms: Int[np.ndarray, "G"]) -> Float[np.ndarray, "G 4"]:

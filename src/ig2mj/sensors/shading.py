@@ -54,14 +54,6 @@ _FALLS = 'max(*rc_static["headlight_diffuse"], *rc_static["headlight_specular"])
 NO_HEADLIGHT = ((_AT_CAMERA, _AT_CAMERA.replace("])", f"] and {_FALLS})", 1)),)
 """A light at the camera that is black by its own colours is not computed."""
 
-_HEAD = "light_diffuse[worldid % light_diffuse.shape[0], wp.static(M_NLIGHT - 1)]"
-
-LIGHTS_PER_WORLD = tuple(
-    (f'wp.static(rc_static["{name}"])' + end, f'wp.cw_mul(wp.static(rc_static["{name}"]), {_HEAD})' + end)
-    for name, end in (("headlight_ambient", ")\n"), ("headlight_diffuse", ",\n"), ("headlight_specular", ",\n"))
-)
-"""The light at the camera in each world's colour, which is that of the last light; that one must be inactive."""
-
 FOV_PER_WORLD = (
     (
         "      ray_dir_local_cam = ray[ray_base + rayid]\n",
@@ -73,6 +65,15 @@ FOV_PER_WORLD = (
     ),
 )
 """Rays spread by each world's factor, which takes the place of the field of view in the model's fields."""
+
+
+def lights_per_world(camera_light: int) -> list[tuple[str, str]]:
+    """The light at the camera in each world's colour, which is that of this light; it must be inactive."""
+    colour = f"light_diffuse[worldid % light_diffuse.shape[0], {camera_light}]"
+    return [
+        (f'wp.static(rc_static["{name}"])' + end, f'wp.cw_mul(wp.static(rc_static["{name}"]), {colour})' + end)
+        for name, end in (("headlight_ambient", ")\n"), ("headlight_diffuse", ",\n"), ("headlight_specular", ",\n"))
+    ]
 
 
 def limit_light(
