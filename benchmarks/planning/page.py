@@ -5,7 +5,8 @@
     python -m benchmarks.planning.page                   writes the page from what was taken in before
 
 What is taken in is one line for each activity in benchmarks/results/planning/<rung>.jsonl, one for each primitive in
-requests.jsonl, and one for each other agent or condition of physics in comparisons.jsonl next to them.
+requests.jsonl, and one for each other agent or condition of physics and each commit in comparisons.jsonl next to them:
+other commits' comparisons are of other activities.
 """
 
 from __future__ import annotations
@@ -137,16 +138,16 @@ def condition_of(row: Row) -> str:
 
 
 def take_in_comparisons(rows: Sequence[Row], main: Sequence[Row], file: pathlib.Path) -> None:
-    """Replaces the lines of the rows' conditions. `main`: main rows, for those of the same starts."""
-    known = {line["condition"]: line for line in read_lines(file)}
+    """Replaces the lines of the rows' conditions at their commits. `main`: main rows, for those of the same starts."""
+    known = {(line["condition"], *line["commits"]): line for line in read_lines(file)}
     solved = {(row["activity"], row["start"]): int(row["success"]) for row in main}
-    for condition in sorted({condition_of(row) for row in rows}):
-        own = [row for row in rows if condition_of(row) == condition]
+    for condition, commit in sorted({(condition_of(row), row["commit"]) for row in rows}):
+        own = [row for row in rows if (condition_of(row), row["commit"]) == (condition, commit)]
         failed = collections.Counter(
             f"{step['primitive']}: {step['reason']}" for row in own for step in row["steps"] if step["reason"]
         )
         same = [solved[key] for row in own if (key := (row["activity"], row["start"])) in solved]
-        known[condition] = {
+        known[condition, commit] = {
             "condition": condition,
             "activities": len({row["activity"] for row in own}),
             "starts": len(own),
@@ -157,7 +158,7 @@ def take_in_comparisons(rows: Sequence[Row], main: Sequence[Row], file: pathlib.
             "crashed": sum(row["crashed"] for row in own),
             "failures": dict(failed.most_common(6)),
             "ended": dict(collections.Counter(r["ended"] for r in own if not r["success"]).most_common(3)),
-            "commits": sorted({row["commit"] for row in own}),
+            "commits": [commit],
             "commands": sorted({row["command"] for row in own}),
             "versions": own[-1]["versions"],
         }
@@ -369,9 +370,13 @@ def _comparisons(lines: Sequence[Row]) -> list[str]:
     for line in lines:
         said = [f"{name} ({count})" for name, count in line["failures"].items()][: 2 * SHOWN]
         same = f"{line['main_solved']} of {line['main_starts']}" if line["main_starts"] else "-"
-        cells = [f"`{line['condition']}`", str(line["activities"]), str(line["starts"]), str(line["solved"]), same]
+        cells = [f"`{line['condition']}`", ", ".join(line["commits"])]
+        cells += [str(line["activities"]), str(line["starts"]), str(line["solved"]), same]
         rows.append([*cells, f"{line['q']:.2f}", "; ".join(said or list(line["ended"])[:1]).replace("|", "/")])
-    head = ("condition", ">activities", ">starts", ">solved", ">main rows on the same starts", ">mean q", "failures")
+    head = (
+        "condition", "commit", ">activities", ">starts", ">solved", ">main rows on the same starts", ">mean q",
+        "failures",
+    )  # fmt: skip
     return [
         "## Other agents and conditions",
         "",

@@ -87,5 +87,10 @@ def test_other_agents_are_compared_on_the_same_starts_and_leave_the_main_rows_al
     other[0] |= {"success": False, "q": 0.0, "steps": [{**STEP, "reason": "no_grasp"}]}
     pages.take_in_comparisons(other, main, tmp_path / "comparisons.jsonl")
     (line,) = pages.read_lines(tmp_path / "comparisons.jsonl")
+    commit = other[0]["commit"]
     text = pages.page({"physics": []}, (), [line])
-    assert "| `--agent random` | 1 | 3 | 2 | 3 of 3 | 0.67 | open: no_grasp (1) |" in text
+    assert f"| `--agent random` | {commit} | 1 | 3 | 2 | 3 of 3 | 0.67 | open: no_grasp (1) |" in text
+    again = [{**row, "commit": "0abcdef0"} for row in other[1:]]
+    pages.take_in_comparisons(again, main, tmp_path / "comparisons.jsonl")
+    lines = pages.read_lines(tmp_path / "comparisons.jsonl")
+    assert sorted((x["commits"], x["starts"]) for x in lines) == sorted([([commit], 3), (["0abcdef0"], 2)])
