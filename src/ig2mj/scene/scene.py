@@ -39,6 +39,7 @@ from ig2mj.scene.parking import add_parking
 from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
 from ig2mj.scene.physics_digest import physics_digest
 from ig2mj.scene.rooms import Rooms, load_rooms
+from ig2mj.scene.small_bodies import steady_small_bodies
 from ig2mj.scene.start_overlap import check_start
 from ig2mj.scene.substance_requests import (
     check_substances,
@@ -213,7 +214,7 @@ class Scene:
 
 
 def _make_solid(spec: mujoco.MjSpec, manifest: Manifest, folder: pathlib.Path) -> None:
-    """Adds collision geometry of the building. The ceiling lies on walls as thin as they are drawn.
+    """Makes the building and small objects fit for physics steps. The ceiling lies on walls as thin as they are drawn.
 
     Raises ManifestError: the manifest names a body that the scene does not have.
     """
@@ -227,6 +228,7 @@ def _make_solid(spec: mujoco.MjSpec, manifest: Manifest, folder: pathlib.Path) -
     deepen_floors(spec, manifest)
     add_ceiling(spec, manifest)
     deepen_walls(spec, manifest)
+    steady_small_bodies(spec, manifest)
     add_parking(spec, manifest)
     add_joints(spec, manifest)
 
