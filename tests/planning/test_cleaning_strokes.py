@@ -5,7 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ig2mj.planning.cleaning_strokes import PRESSED, HeldTool, Region, Stroke, one_after_another, regions_of, turn_about
+from ig2mj.planning.cleaning_strokes import (
+    FIRST,
+    PRESSED,
+    SHIFTED_TURNS,
+    HeldTool,
+    Region,
+    Stroke,
+    one_after_another,
+    regions_of,
+    turn_about,
+)
 from ig2mj.planning.world import DirtSpot
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -15,7 +25,7 @@ SPONGE = np.array(np.meshgrid([-0.05, 0.05], [-0.05, 0.05], [-0.01, 0.01])).resh
 
 
 def covered(region, pressed_on, spots):
-    low, high = region.box(region.at(pressed_on))
+    low, high = region.swept(pressed_on)
     return [s for s in spots if (low <= s.pos).all() and (s.pos <= high).all()]
 
 
@@ -45,7 +55,7 @@ def test_upper_sides_come_first_and_then_the_nearest():
 def test_a_gripper_turns_its_tool_about_the_face_until_it_points_away_from_the_robot():
     ahead, out = np.array([1.0, 0.0, -1.0]) / np.sqrt(2), np.array([1.0, 0.0, 1.0]) / np.sqrt(2)
     held = HeldTool.__new__(HeldTool)
-    held.hand, held.has_area, held.out, held.corners = 0, True, out, np.eye(3)
+    held.hand, held.has_area, held.out, held.corners, held.whole = 0, True, out, np.eye(3), np.eye(3)
     axes = lambda hand: (np.array([0.0, 1.0, 0.0]), ahead)  # noqa: E731
     held.world = SimpleNamespace(body=SimpleNamespace(opening=0.1), base=(np.zeros(2), 0.0), hand_axes=axes)
     regions = regions_of(held, 0.0, np.array([0.0, 0.0, 1.0]))
@@ -53,3 +63,57 @@ def test_a_gripper_turns_its_tool_about_the_face_until_it_points_away_from_the_r
     assert first @ out == pytest.approx([0.0, 0.0, -1.0], abs=1e-6)
     assert first @ ahead == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
     assert all((r.rotation @ ahead)[0] > -0.5 for r in regions)
+
+
+def held_rag(rim=0.004):
+    """A rag below a floating hand, whose lower side cleans up to `rim` m from its edge."""
+    side, low = 0.16, -0.05
+    whole = np.array(np.meshgrid([-side, side], [-side, side], [low, low + 0.02])).reshape(3, -1).T
+    inner = side - rim
+    held = HeldTool.__new__(HeldTool)
+    held.hand, held.has_area, held.out, held.whole = 0, True, -UP, whole
+    held.corners = np.array(np.meshgrid([-inner, inner], [-inner, inner], [low, low + 0.008])).reshape(3, -1).T
+    axes = lambda hand: (np.array([1.0, 0.0, 0.0]), -UP)  # noqa: E731
+    held.world = SimpleNamespace(body=SimpleNamespace(opening=None), base=(np.zeros(2), 0.0), hand_axes=axes)
+    return held
+
+
+@pytest.mark.parametrize("normal", [UP, np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])])
+def test_only_turns_count_in_which_the_part_that_cleans_comes_to_the_face_first(normal):
+    held = held_rag()
+    regions = regions_of(held, 0.0, normal)
+    assert any(r.cleans for r in regions) and any(not r.cleans for r in regions)
+    for region in regions:
+        ahead_of_it = (region.corners @ normal).min() - (held.whole @ region.rotation.T @ normal).min()
+        assert region.cleans == (ahead_of_it <= FIRST)
+
+
+def test_where_no_turn_brings_the_part_that_cleans_first_the_best_ones_count():
+    held = held_rag()
+    held.whole = held.whole - [0.0, 0.0, 0.03]  # a rim stands out all around it
+    regions = regions_of(held, 0.0, UP)
+    assert any(r.cleans for r in regions)
+
+
+@pytest.mark.parametrize("normal", [UP, np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.8, 0.0])])
+def test_a_tool_takes_a_particle_off_with_each_side_of_its_box(normal):
+    regions = [r for r in regions_of(held_rag(), 0.0, normal) if r.shift.any()]
+    spot = DirtSpot(0, np.array([1.0, 2.0, 0.1]), normal)
+    assert len(regions) == 8 * SHIFTED_TURNS
+    for region in regions:
+        assert abs(region.shift @ normal) < 1e-9
+        assert covered(region, spot, [spot]) == [spot]
+    assert min(np.linalg.norm(r.shift) for r in regions) > 0.1
+
+
+def test_a_thin_tool_takes_off_all_particles_of_a_face_that_it_lies_on():
+    region = regions_of(held_rag(), 0.0, UP)[0]
+    spots = [DirtSpot(n, np.array([x, 0.0, 0.0]), UP) for n, x in enumerate((0.0, 0.1, -0.14, 0.2))]
+    assert covered(region, spots[0], spots) == spots[:3]
+
+
+def test_what_stands_next_to_a_particle_leaves_room_for_a_tool_that_is_shifted():
+    wall = 0.05  # m beyond the particle
+    spot = DirtSpot(0, np.zeros(3), UP)
+    reach = [region.box(region.at(spot))[1][0] for region in regions_of(held_rag(), 0.0, UP) if region.cleans]
+    assert reach[0] > wall and min(reach) < wall

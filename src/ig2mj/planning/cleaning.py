@@ -6,6 +6,7 @@ Where a tool is pressed is planned in `ig2mj.planning.cleaning_strokes`.
 from __future__ import annotations
 
 import collections
+import dataclasses
 from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
@@ -111,12 +112,14 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 tried[stroke.spot.number] += 1
                 if not world.facts.holds(predicate, name) or tool not in world.held:
                     break
-                if stroke.spot.number not in {spot.number for spot in world.dirt(predicate, name)}:
+                spot = next((s for s in world.dirt(predicate, name) if s.number == stroke.spot.number), None)
+                if spot is None:
                     continue
-                program = _program(world, tool, hand, stroke)
+                present = dataclasses.replace(stroke, spot=spot)  # a drawer may have moved
+                program = _program(world, tool, hand, present)
                 if not program and strayed(world, hand):
                     yield from go_home_past(world, hand, came)
-                    program = _program(world, tool, hand, stroke) if tool in world.held else []
+                    program = _program(world, tool, hand, present) if tool in world.held else []
                 if program:
                     came = [world.grip(hand), *(np.array(p.pos) for p in program[:-2] if p.pos is not None)]
                     reason, detail = (yield program), f"{tool} did not take enough off {name}"
@@ -166,7 +169,7 @@ def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Progr
         regions = [planned, *(Region.turned(turn, held.corners) for turn in turns)]
     ways = 0
     for region in [planned, *(r for r in regions if r is not planned)]:
-        if not world.reaches(hand, stance, region.at(spot)):
+        if not region.cleans or not world.reaches(hand, stance, region.at(spot)):
             continue
         spheres = held.spheres(region.rotation)
         if not obstacles.clear(spheres + np.array([*region.above(spot), 0.0])):

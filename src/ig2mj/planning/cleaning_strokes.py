@@ -31,6 +31,13 @@ outside of its box."""
 TURNS = (np.pi / 2, -np.pi / 2, np.pi)
 """rad about a face's normal by which a tool is turned where it has no room otherwise."""
 
+FIRST = 0.002
+"""m by which the rest of a tool may come to a face before the part that cleans: farther away that touches nothing."""
+
+SHIFTED, SHIFTED_TURNS = 0.4, 2
+"""Share of a tool's box, along the face, by which its middle is off a particle that has no room around it; and turns in
+which it is shifted."""
+
 BACKWARDS, ARM_TURNS = -0.2, 6
 """Cosine of the angle between where a gripper on an arm points and where it likes to, below which it does not clean;
 and turns of its tool that are tried at most."""
@@ -57,6 +64,8 @@ OPEN, ROOM, HIDDEN, HIDDEN_WORTH = np.array([0.12, 0.2, 0.3]), 0.06, 2, 0.25
 """m before a face, and around it, that have to be free for a tool to come straight to it; particles that a stroke below
 something has to cover more than others to be chosen, and what these count."""
 
+EAST = np.array([1.0, 0.0, 0.0])
+
 ELSEWHERE = 0.12
 """m between stances from which an object is cleaned."""
 
@@ -64,13 +73,20 @@ ELSEWHERE = 0.12
 @dataclasses.dataclass(frozen=True, eq=False)
 class Region:
     """Where a held tool cleans when it is turned by `rotation`: corners of the part that cleans, and their box, m from
-    the hand's grasp point; `lifted`: m off a face from which on the tool is pressed on it."""
+    the hand's grasp point.
+
+    Attributes:
+      lifted: m off a face from which on the tool is pressed on it. shift: m from the particle that it is pressed on to
+        its middle, along the face. cleans: the part that cleans comes to the face first.
+    """
 
     rotation: Rotation
     corners: Float[np.ndarray, "n 3"]
     low: Vector
     high: Vector
     lifted: float = LIFTED
+    shift: Vector = dataclasses.field(default_factory=lambda: np.zeros(3))
+    cleans: bool = True
 
     @classmethod
     def turned(cls, rotation: Rotation, corners: Float[np.ndarray, "n 3"]) -> Region:
@@ -85,7 +101,17 @@ class Region:
     def at_all(self, pos: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """`at` of many particles."""
         depth = np.ptp(normal @ self.corners.T, axis=1) / 2
-        return pos + normal * (depth - PRESSED)[:, None] - (self.low + self.high) / 2
+        return pos + normal * (depth - PRESSED)[:, None] + self.shift - (self.low + self.high) / 2
+
+    def shifted(self, normal: Vector) -> list[Region]:
+        """The same with the particle near each side, and each corner, of its box: where something stands next to it."""
+        across, along = (axis * self._far(axis) for axis in axes_along(normal))
+        steps = [(a, b) for a in (0, 1, -1) for b in (0, 1, -1)][1:]
+        return [dataclasses.replace(self, shift=SHIFTED * (a * across + b * along)) for a, b in steps]
+
+    def _far(self, axis: Vector) -> float:
+        """m along an axis from one side of its box to the other, through the middle."""
+        return float(((self.high - self.low) / np.maximum(np.abs(axis), 1e-6)).min())
 
     def above(self, spot: DirtSpot) -> Vector:
         """Grasp point of the hand right before."""
@@ -95,6 +121,13 @@ class Region:
         """Lower and upper corner of what it cleans with the hand's grasp point at a place."""
         return grip + self.low - SLACK, grip + self.high + SLACK
 
+    def swept(self, spot: DirtSpot) -> tuple[Vector, Vector]:
+        """Lower and upper corner of what it cleans from where it comes to a particle's face, which stops it, to where
+        it would be pressed into it: particles of that face, in front of a thin tool, are between."""
+        low, high = self.box(self.at(spot))
+        back = PRESSED * spot.normal
+        return np.minimum(low, low + back), np.maximum(high, high + back)
+
 
 class HeldTool:
     """A tool as a hand holds it now: the part that cleans, and spheres of hand and tool, m from the grasp point."""
@@ -103,7 +136,8 @@ class HeldTool:
         self.world, self.tool, self.hand = world, tool, hand
         area, self.out = cleaning_area(world, tool)
         self.has_area = area is not None
-        self.corners = (world.vertices(tool) if area is None else area) - world.grip(hand)
+        self.whole = world.vertices(tool) - world.grip(hand)
+        self.corners = self.whole if area is None else area - world.grip(hand)
         self._spheres = world.spheres(*world.hand_axes(hand), holding=tool, hand=hand)
 
     def spheres(self, rotation: Rotation) -> Float[np.ndarray, "S 4"]:
@@ -114,7 +148,20 @@ class HeldTool:
 def regions_of(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
     """Turns of a tool with its box, for a robot that looks along `yaw`, rad: with its cleaning area towards the face;
     as it is carried; of a hand that floats, turned about the normal and tilted, too, and close to the face, where there
-    is less room. A tilted tool cleans in a larger box."""
+    is less room. A tilted tool cleans in a larger box. Then the first ones with the particle near the rim of the box.
+    """
+    found = _turned_regions(held, yaw, normal)
+    late = [float((held.whole @ (r.rotation.T @ normal)).min() - (r.corners @ normal).min()) for r in found]
+    enough = min(-FIRST, max(late))
+    found = [dataclasses.replace(r, cleans=by >= enough) for r, by in zip(found, late, strict=True)]
+    first = [r for r in found if r.cleans]
+    near = [r for r in first if r.lifted == first[0].lifted]
+    off = [shifted for r in near[:SHIFTED_TURNS] for shifted in r.shifted(normal)]
+    return found + off
+
+
+def _turned_regions(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
+    """Those with the particle in the middle."""
     world, points = held.world, held.corners
     carried = about_vertical(yaw - world.base[1])
     facing = turn_onto(carried @ held.out, -normal) @ carried if held.has_area else carried
@@ -122,9 +169,7 @@ def regions_of(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
     if world.body.opening is not None:
         return [Region.turned(r, points) for r in _of_arm(held, yaw, normal, facing, carried)]
     rotations += [turn_about(normal, angle) @ facing for angle in TURNS]
-    across = np.cross(normal, UP) if abs(normal[2]) < 0.9 else np.array([-np.sin(yaw), np.cos(yaw), 0.0])
-    across = across / np.linalg.norm(across)
-    tilts = [turn_about(axis, angle) for axis in (across, np.cross(normal, across)) for angle in TILTS]
+    tilts = [turn_about(axis, angle) for axis in axes_along(normal, aside(yaw)) for angle in TILTS]
     rotations += [tilt @ facing for tilt in tilts] + [tilt @ turn_about(normal, np.pi / 2) @ facing for tilt in tilts]
     found = [Region.turned(r, points) for r in rotations]
     return found + [dataclasses.replace(r, lifted=CLOSE) for r in found]
@@ -140,6 +185,18 @@ def _of_arm(held: HeldTool, yaw: float, normal: Vector, facing: Rotation, carrie
     score = [round(float(r @ palm @ aim), 1) for r in found]
     order = sorted(range(len(found)), key=lambda k: -score[k])
     return [found[k] for k in order if score[k] > BACKWARDS][:ARM_TURNS] or [facing]
+
+
+def aside(yaw: float) -> Vector:
+    """The horizontal direction to the left of a robot that looks along `yaw`, rad."""
+    return np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+
+
+def axes_along(normal: Vector, level: Vector = EAST) -> tuple[Vector, Vector]:
+    """Two axes along a face at right angles, the first one horizontal; of one that is about level, about `level`."""
+    across = np.cross(normal, UP) if abs(normal[2]) < 0.9 else level - (level @ normal) * normal
+    across = across / np.linalg.norm(across)
+    return across, np.cross(normal, across)
 
 
 def turn_about(axis: Vector, angle: float) -> Rotation:
@@ -233,7 +290,7 @@ class _From:
         low, high = np.zeros((len(near), 3)), np.zeros((len(near), 3))
         for row, k in enumerate(near):
             region, _ = self._turned(spots[k].normal)[turns[k]]
-            low[row], high[row] = region.box(region.at(spots[k]))
+            low[row], high[row] = region.swept(spots[k])
         covers = np.all((low[:, None] <= pos) & (pos <= high[:, None]), axis=-1)
         covers[np.arange(len(near)), near] = True
         left, strokes = np.ones(len(near), bool), list[Stroke]()
@@ -279,6 +336,8 @@ class _From:
             to_robot = (normal[:, 2] > 0.5) | (((here - pos[:, :2]) * normal[:, :2]).sum(1) > 0)
             left = to_robot | (pos[:, 2] < OVER_TOP)
             for turn, (region, spheres) in enumerate(self._turned(normal[0])):
+                if not region.cleans:
+                    continue
                 if turn > OVERS:  # over the rim of a bathtub to its near inner side
                     left &= to_robot
                 if not left.any():
