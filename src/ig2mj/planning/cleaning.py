@@ -169,7 +169,7 @@ def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Progr
         regions = [planned, *(Region.turned(turn, held.corners) for turn in turns)]
     ways = 0
     for region in [planned, *(r for r in regions if r is not planned)]:
-        if not region.cleans or not world.reaches(hand, stance, region.at(spot)):
+        if not world.reaches(hand, stance, region.at(spot)):
             continue
         spheres = held.spheres(region.rotation)
         if not obstacles.clear(spheres + np.array([*region.above(spot), 0.0])):

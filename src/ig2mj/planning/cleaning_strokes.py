@@ -24,7 +24,7 @@ from ig2mj.planning.world import DirtSpot, PlannedWorld, Rotation, Stance, Vecto
 STROKES = 8
 """Places of the tool for each stance, at most."""
 
-PRESSED, LIFTED, CLOSE, SLACK = 0.02, 0.06, 0.03, 0.0
+PRESSED, LIFTED, CLOSE, SLACK = 0.02, 0.06, 0.035, 0.0
 """m that a tool is pressed into a face, and is lifted off it, also where there is less room; by which particles may be
 outside of its box."""
 
@@ -77,7 +77,7 @@ class Region:
 
     Attributes:
       lifted: m off a face from which on the tool is pressed on it. shift: m from the particle that it is pressed on to
-        its middle, along the face. cleans: the part that cleans comes to the face first.
+        its middle, along the face.
     """
 
     rotation: Rotation
@@ -86,7 +86,6 @@ class Region:
     high: Vector
     lifted: float = LIFTED
     shift: Vector = dataclasses.field(default_factory=lambda: np.zeros(3))
-    cleans: bool = True
 
     @classmethod
     def turned(cls, rotation: Rotation, corners: Float[np.ndarray, "n 3"]) -> Region:
@@ -148,16 +147,16 @@ class HeldTool:
 def regions_of(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
     """Turns of a tool with its box, for a robot that looks along `yaw`, rad: with its cleaning area towards the face;
     as it is carried; of a hand that floats, turned about the normal and tilted, too, and close to the face, where there
-    is less room. A tilted tool cleans in a larger box. Then the first ones with the particle near the rim of the box.
+    is less room. A tilted tool cleans in a larger box. Only those count in which the part that cleans comes to the face
+    first: the others touch nothing with it. Then come the first of them with the particle near the rim of the box.
     """
     found = _turned_regions(held, yaw, normal)
     late = [float((held.whole @ (r.rotation.T @ normal)).min() - (r.corners @ normal).min()) for r in found]
     enough = min(-FIRST, max(late))
-    found = [dataclasses.replace(r, cleans=by >= enough) for r, by in zip(found, late, strict=True)]
-    first = [r for r in found if r.cleans]
+    first = [r for r, by in zip(found, late, strict=True) if by >= enough]
     near = [r for r in first if r.lifted == first[0].lifted]
     off = [shifted for r in near[:SHIFTED_TURNS] for shifted in r.shifted(normal)]
-    return found + off
+    return [*first, *off]
 
 
 def _turned_regions(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
@@ -168,11 +167,23 @@ def _turned_regions(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
     rotations = [facing, carried] if held.has_area else [facing]
     if world.body.opening is not None:
         return [Region.turned(r, points) for r in _of_arm(held, yaw, normal, facing, carried)]
+    if held.has_area:
+        aligned = turn_about(normal, _askew(points @ facing.T, normal)) @ facing
+        rotations += [aligned, turn_about(normal, np.pi / 2) @ aligned]
     rotations += [turn_about(normal, angle) @ facing for angle in TURNS]
     tilts = [turn_about(axis, angle) for axis in axes_along(normal, aside(yaw)) for angle in TILTS]
     rotations += [tilt @ facing for tilt in tilts] + [tilt @ turn_about(normal, np.pi / 2) @ facing for tilt in tilts]
     found = [Region.turned(r, points) for r in rotations]
     return found + [dataclasses.replace(r, lifted=CLOSE) for r in found]
+
+
+def _askew(points: Float[np.ndarray, "n 3"], normal: Vector) -> float:
+    """rad about a face's normal by which a tool is turned so that its box along the face is smallest: it fits between
+    bars, and next to what stands on the face."""
+    u, v = (points @ axis for axis in axes_along(normal))
+    angles = np.deg2rad(np.arange(0.0, 90.0, 2.0))
+    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    return float(angles[int(np.argmin(np.ptp(c * u - s * v, axis=1) * np.ptp(s * u + c * v, axis=1)))])
 
 
 def _of_arm(held: HeldTool, yaw: float, normal: Vector, facing: Rotation, carried: Rotation) -> list[Rotation]:
@@ -336,8 +347,6 @@ class _From:
             to_robot = (normal[:, 2] > 0.5) | (((here - pos[:, :2]) * normal[:, :2]).sum(1) > 0)
             left = to_robot | (pos[:, 2] < OVER_TOP)
             for turn, (region, spheres) in enumerate(self._turned(normal[0])):
-                if not region.cleans:
-                    continue
                 if turn > OVERS:  # over the rim of a bathtub to its near inner side
                     left &= to_robot
                 if not left.any():
