@@ -121,4 +121,4 @@ def test_a_tool_that_a_hand_holds_askew_is_turned_along_the_face():
     held, turn = held_rag(), turn_about(UP, 0.4)
     held.corners, held.whole = held.corners @ turn.T, held.whole @ turn.T
     sizes = [np.ptp(region.corners, axis=0)[:2].prod() for region in regions_of(held, 0.0, UP)]
-    assert min(sizes) == pytest.approx(0.312**2, rel=0.02) and sizes[0] > 1.5 * min(sizes)
+    assert min(sizes) == pytest.approx(0.312**2, rel=0.05) and sizes[0] > 1.5 * min(sizes)
