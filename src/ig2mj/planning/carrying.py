@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.geometry.host_rotations import about_vertical
+from ig2mj.planning.moves import TOUCHES
 from ig2mj.planning.world import PlannedWorld, Stance
 
 HEADINGS, APART = 16, 0.1
@@ -23,14 +24,23 @@ TURN = 0.15
 
 
 def carried_way(world: PlannedWorld, points: Float[np.ndarray, "N 2"], yaw: float) -> list[Stance] | None:
-    """Stances one after another, between which the base shifts, or turns where it is; None: there is no such way.
+    """Stances one after another, between which the base shifts, or turns where it is; None: there is no such way. Where
+    there is none on which what is held keeps clear, it is brought past other things that closely.
 
     Args:
       points: of a way over the floor; the first is where the robot is. yaw: rad, at its end.
     """
+    ways = (_carried_way(world, points, yaw, share) for share in (1.0, TOUCHES))
+    return next((way for way in ways if way is not None), None)
+
+
+def _carried_way(
+    world: PlannedWorld, points: Float[np.ndarray, "N 2"], yaw: float, share: float
+) -> list[Stance] | None:
+    """`carried_way` with a share of the radii of what is held."""
     places = _sampled(points)
     (here, now), last = world.base, len(places) - 1
-    held = _held(world)
+    held = _held(world) * (1.0, 1.0, 1.0, share)
     obstacles = world.obstacles([n for n in world.held if n and not world.domain.fixed(n)])
     step = 2 * np.pi / HEADINGS
     goal = last, round((yaw - now) / step) % HEADINGS

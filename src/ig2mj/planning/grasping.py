@@ -121,6 +121,13 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
     return Outcome(reason or "no_grasp", detail, attempts=attempts)
 
 
+def held_again(world: PlannedWorld, name: str) -> Generator[Program, str, bool]:
+    """Takes what a primitive holds again where the hands have lost it; returns whether they hold it."""
+    if name in world.held:
+        return True
+    return (yield from grasp(world, Step("grasp", (name,)))).done
+
+
 def _leaves_free(world: PlannedWorld, name: str, pose: GraspPose) -> float:
     return float(leaves_free(world, name, pose))
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
+from ig2mj.planning.grasping import held_again
 from ig2mj.planning.holding import Hold, hold_at, wait_until
 from ig2mj.planning.moves import Primitive, Program, carry, hand_with, travel
 from ig2mj.planning.placing import bring_out, regrasp
@@ -37,25 +38,27 @@ def hold_below_tap(
     """
     hand, source = hand_with(world, name), source_of(world, tap)
     reason, failed, again, moved = "", set[int](), False, set[str]()
-    for _ in range(WAYS + MOST_MOVED):
+    for attempt in range(WAYS + MOST_MOVED):
+        if not (yield from held_again(world, name)):
+            return Outcome("slipped", f"the hand lost {name}", attempts=attempt)
+        hand = hand_with(world, name)
         left = lambda hand=hand: [h for h in holds(hand, source) if h.number not in failed]  # noqa: E731
         reason, way, number = yield from hold_at(world, name, hand, left)
         if reason == "slipped" and name not in world.held:
-            return Outcome(reason, f"the hand lost {name}")
+            continue
         if number < 0 and (yield from clear_basin(world, source, moved)) and name in world.held:
             continue
         if number < 0 and not again and (yield from regrasp(world, name, hand)):  # by another side
-            again, hand = True, hand_with(world, name)
+            again = True
             continue
         if number < 0:
             return Outcome(reason, f"the hand has no way with {name} below {tap}")
         reason = reason or (yield from wait_until(world, condition, seconds, world.index(name)))
-        yield [*travel(hand, way[-2::-1], None), carry(world, hand)]
+        if name in world.held:
+            yield [*travel(hand, way[-2::-1], None), carry(world, hand)]
         if world.facts.holds(*condition):
             return Outcome()
         failed.add(number)
-        if name not in world.held:
-            return Outcome("slipped", f"the hand lost {name}")
     return Outcome(reason or "not_true_after", f"{name} did not take enough water")
 
 

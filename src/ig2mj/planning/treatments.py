@@ -9,7 +9,7 @@ import numpy as np
 
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.grasping import grasp
+from ig2mj.planning.grasping import grasp, held_again
 from ig2mj.planning.holding import Hold, hold_at, wait_until
 from ig2mj.planning.moves import (
     ATTEMPTS,
@@ -131,7 +131,7 @@ def cook(world: PlannedWorld, step: Step) -> Primitive:
     if world.facts.holds("cooked", name):
         return Outcome()
     way: list[Vector] = []
-    hand = -1
+    hand, reason = -1, ""
     if not rules.acts_inside:
         hand = hand_with(world, name)
         tables = world.domain.model.tables
@@ -139,7 +139,14 @@ def cook(world: PlannedWorld, step: Step) -> Primitive:
         link = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
         half = float(np.ptp(world.vertices(name)[:, 2])) / 2
         points = [link - (above + half) * DOWN for above in (0.06, 0.1, 0.14)]
-        reason, way, _ = yield from hold_at(world, name, hand, lambda: _holds_at(world, name, hand, points))
+        for attempt in range(ATTEMPTS):
+            if not (yield from held_again(world, name)):
+                return Outcome("slipped", f"the hand lost {name}", attempts=attempt)
+            hand = hand_with(world, name)
+            holds = functools.partial(_holds_at, world, name, hand, points)
+            reason, way, _ = yield from hold_at(world, name, hand, holds)
+            if reason != "slipped":
+                break
         if reason:
             return Outcome(reason, f"the hand has no way with {name} over {source}")
     keeps = world.index(name) if hand >= 0 else -1

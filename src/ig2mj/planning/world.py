@@ -37,6 +37,10 @@ CARRIED = 0.03
 BODY_SPARE = 0.04
 """m that are left between the body and what it carries."""
 
+HANGS, RAISED, HIGHEST = 0.05, 0.35, 1.85
+"""m below a floating hand that what it carries may hang before it is carried higher; by which it is, at most; and
+height of its top then, at most, which passes below the heads of doors."""
+
 WIDE = 0.25
 """m, half the diagonal of what a floating hand carries, from which on it is carried in front of the body's middle."""
 
@@ -306,14 +310,23 @@ class PlannedWorld:
         return float(min(AWAY + max(np.linalg.norm(spheres[:, :2], axis=1).max() - ALONG[-1], 0.0), FARTHEST))
 
     def carry(self, hand: int, name: str = "") -> Vector:
-        """Where a hand carries an object, "": what it holds, in the body's frame: as far ahead as that is wide."""
+        """Where a hand carries an object, "": what it holds, in the body's frame: as far ahead as that is wide, and, if
+        the hand floats, so high that what hangs below it passes over counters."""
         x, y, z = self.body.carry[hand]
         if name := name or self.held[hand]:
             low, high = self.vertices(name).min(0), self.vertices(name).max(0)
             half = float(np.linalg.norm((high - low)[:2])) / 2
             x = max(x, self.body.trunk[0] + BODY_SPARE + half)
             y = 0.0 if half > WIDE and self.body.opening is None else y  # the middle of the way through a door
+            if self.body.opening is None and self.held[hand] == name and self.held.count(name) == 1:
+                z += self._raised(hand, float(low[2]), float(high[2]))
         return np.array([x, y, z])
+
+    def _raised(self, hand: int, low: float, high: float) -> float:
+        """m by which a hand carries what reaches from a height to another higher than other things."""
+        grip = float(self.grip(hand)[2])
+        room = HIGHEST - (self.body.stands + float(self.body.carry[hand][2]) + high - grip)
+        return float(np.clip(grip - low - HANGS, 0.0, max(min(room, RAISED), 0.0)))
 
     def from_body(self, point: Vector) -> Vector:
         """A point of the body's frame, where the robot stands now; world frame."""

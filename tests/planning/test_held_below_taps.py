@@ -1,0 +1,79 @@
+"""What hangs below a hand is carried over counters, and what is lost on the way to a tap is taken again."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ig2mj.planning import grasping, taps
+from ig2mj.planning.steps import Outcome
+from ig2mj.planning.world import HANGS, HIGHEST, RAISED, PlannedWorld
+
+GRIP = np.array([0.5, 0.0, 0.9])
+
+
+class Carrying(PlannedWorld):
+    """A hand at `GRIP` that holds a column from `below` m under it to `above` m over it."""
+
+    def __init__(self, below: float, above: float = 0.0, opening: float | None = None):
+        body = SimpleNamespace(carry=np.array([[0.34, 0.16, 0.5]]), trunk=(0.2, 1.0), opening=opening, stands=0.5)
+        self.body, self._corners = body, GRIP + np.array([[-0.05, -0.05, -below], [0.05, 0.05, above]])
+
+    held = property(lambda self: ["vase"])  # pyright: ignore
+    grip = lambda self, hand: GRIP  # noqa: E731  # pyright: ignore
+    vertices = lambda self, name: self._corners  # noqa: E731  # pyright: ignore
+
+
+def test_what_hangs_below_a_floating_hand_is_carried_higher():
+    flat, hanging, low = (Carrying(b).carry(0)[2] for b in (HANGS, HANGS + 0.2, 2.0))
+    assert flat == pytest.approx(0.5)
+    assert hanging == pytest.approx(0.7)
+    assert low == pytest.approx(0.5 + RAISED)
+    assert Carrying(0.4, opening=0.1).carry(0)[2] == pytest.approx(0.5)  # an arm has its own poses
+
+
+def test_it_still_passes_below_the_heads_of_doors():
+    above = HIGHEST - 1.0 - 0.1
+    assert Carrying(0.4, above).carry(0)[2] == pytest.approx(0.6)
+    assert Carrying(0.4, HIGHEST).carry(0)[2] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("losses", [1, 2])
+def test_what_is_lost_on_the_way_to_a_tap_is_taken_again(monkeypatch, losses):
+    world: Any = SimpleNamespace(held=["cup", ""], index=lambda name: 0, base=(np.zeros(2), 0.0))
+    wet = []
+    world.facts = SimpleNamespace(holds=lambda *condition: bool(wet))
+    taken = []
+
+    def grasp(world, step):
+        taken.append(step.object)
+        world.held[len(taken) % 2] = "cup"  # by the other hand
+        yield []
+        return Outcome()
+
+    def hold_at(world, name, hand, holds):
+        assert world.held[hand] == name
+        yield []
+        if len(taken) < losses:
+            world.held[:] = ["", ""]
+            return "slipped", [], -1
+        return "", [np.zeros(3)], 0
+
+    def wait_until(world, condition, seconds, keeps):
+        yield []
+        wet.append(True)
+        return ""
+
+    monkeypatch.setattr(grasping, "grasp", grasp)
+    monkeypatch.setattr(taps, "hold_at", hold_at)
+    monkeypatch.setattr(taps, "wait_until", wait_until)
+    monkeypatch.setattr(taps, "source_of", lambda world, tap: np.zeros(3))
+    monkeypatch.setattr(taps, "carry", lambda world, hand: None)
+    running = taps.hold_below_tap(world, "cup", "sink", lambda hand, source: [], ("soaked", "cup"), 1.0)
+    with pytest.raises(StopIteration) as ended:
+        while True:
+            next(running)
+    assert ended.value.value.done and len(taken) == losses
