@@ -11,6 +11,7 @@ import numpy as np
 
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.knowledge.substances import DUST, WATER
+from ig2mj.knowledge.transitions import STIRRERS, Transition
 from ig2mj.planning.steps import PRIMITIVES, Step
 from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom
@@ -176,6 +177,23 @@ class Domain:
         names = {self.model.tables.object_names[found.containers.object[row]] for row in sprays(self.model)}
         return tuple(n for n in self.pourable if n in names)
 
+    @functools.cached_property
+    def stirrers(self) -> tuple[str, ...]:
+        """Objects that stir, and can be carried."""
+        categories = self.model.tables.object_categories
+        return tuple(n for n in self.loose if categories[self.index(n)] in STIRRERS and self.graspable(n))
+
+    def recipes(self, substance: str) -> tuple[Transition, ...]:
+        """Rules by which stirring makes a substance of others, at any temperature."""
+        rules = () if self.model.substances is None else self.model.substances.rules
+        plain = [r for r in rules if r.stir and r.inputs and not r.objects and not r.count]
+        return tuple(r for r in plain if r.output == substance and np.isneginf(r.temperature) and np.isinf(r.cold))
+
+    @functools.cached_property
+    def mixable(self) -> tuple[str, ...]:
+        """Substances that stirring makes of others in use."""
+        return () if self.model.substances is None else tuple(s for s in self.model.substances.names if self.recipes(s))
+
     def litres(self, name: str) -> float:
         """Litres that a container holds; of anything else, 0."""
         found = self.model.substances
@@ -279,6 +297,8 @@ class Domain:
         if substance == WATER and predicate == "saturated" and self.taps and not self.fixed(name):
             return ""
         others = [n for n in self.pourable if n != name]
+        if predicate in ("filled", "contains") and self.recipes(substance) and any(n != name for n in self.stirrers):
+            return ""
         return "" if others else f"no container can be carried to '{name}' to pour {substance} out of it"
 
     def attachable(self, name: str) -> tuple[str, ...]:

@@ -16,7 +16,11 @@ def named_things(domain: Domain, problem: Problem) -> list[str]:
     rooms = domain.model.tables.room_names
     names = [n for n in problem.named if n not in rooms and _category(domain, n) not in GROUND]
     sources = [s.name for s in domain.sources]
-    return list(dict.fromkeys([*names, *domain.tools, *domain.knives, *domain.taps, *sources, *domain.pourable]))
+    return list(
+        dict.fromkeys(
+            [*names, *domain.tools, *domain.knives, *domain.taps, *sources, *domain.pourable, *domain.stirrers]
+        )
+    )
 
 
 def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
@@ -40,6 +44,7 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
         "fill": [n for n in loose if n in domain.fillable],
         "attach": [n for n in loose if domain.attachable(n)],
         "pour": list(domain.pourable),
+        "mix": [n for n in things if domain.contains(n)],
         "spray": [n for n in problem.named if n in things and n not in domain.sprays],
         "slice": [n for n in things if domain.has(n, "sliceable")],
         "cook": [n for n in loose if domain.has(n, "cookable")],
@@ -54,6 +59,7 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
         "slice": domain.knives,
         "pour": [n for n in problem.named if n in things],
         "spray": domain.sprays,
+        "mix": domain.stirrers,
     }
     substances = substances_to_move(domain, problem)
     for primitive, kind in PRIMITIVES.items():
@@ -67,7 +73,8 @@ def ground_steps(domain: Domain, problem: Problem) -> Iterator[Step]:
                 others = [s.name for s in (domain.heaters if primitive == "cook" else domain.coolers)(name)]
             if primitive == "attach":
                 others = domain.attachable(name)
-            last = [(s,) for s in substances] if SUBSTANCE in kind.arguments else [()]
+            moved = [s for s in substances if primitive != "mix" or domain.recipes(s)]
+            last = [(s,) for s in moved] if SUBSTANCE in kind.arguments else [()]
             pairs = itertools.product(others, last)
             yield from (make_step(primitive, (name, other, *more)) for other, more in pairs if other != name)
 

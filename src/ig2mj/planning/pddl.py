@@ -31,7 +31,8 @@ DOMAIN = """\
     (sliced ?o - thing) (cooked ?o - thing) (frozen ?o - thing)
     (filled ?o - thing ?l - substance) (contains ?o - thing ?l - substance) (container ?o - thing)
     (covered ?o - thing ?l - substance) (saturated ?o - thing ?l - substance) (absorbs ?o - thing)
-    (sprays ?o - thing) (attached ?o ?s - thing) (fits ?o ?s - thing)
+    (sprays ?o - thing) (stirs ?o - thing) (part_of ?i ?l - substance)
+    (attached ?o ?s - thing) (fits ?o ?s - thing)
     (openable ?o - thing) (switched ?o - thing) (tool ?o - thing) (knife ?o - thing) (tap ?o - thing)
     (heats ?s ?o - thing) (cools ?s ?o - thing) (acts_inside ?s - thing) (needs_switch ?s - thing)
     (needs_closed ?s - thing))
@@ -85,6 +86,10 @@ DOMAIN = """\
   (:action spray :parameters (?o ?s - thing ?l - substance ?h - hand)
     :precondition (and (held ?s) (sprays ?s) (contains ?s ?l) (free ?h))
     :effect (and (when (absorbs ?o) (saturated ?o ?l)) (when (not (absorbs ?o)) (covered ?o ?l))))
+  (:action mix :parameters (?o ?t - thing ?l - substance)
+    :precondition (and (container ?o) (stirs ?t) (held ?t)
+      (forall (?i - substance) (imply (part_of ?i ?l) (contains ?o ?i))))
+    :effect (and (contains ?o ?l) (forall (?i - substance) (when (part_of ?i ?l) (not (contains ?o ?i))))))
   (:action scrub :parameters (?o ?t - thing)
     :precondition (and (tool ?t) (held ?t) (soaked ?t))
     :effect (not (stained ?o)))
@@ -138,6 +143,8 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
     hands = [f"hand_{k}" for k in range(domain.hands)]
     liquids = {a for c in conditions for a in c.arguments if a not in c.objects}
     liquids |= {a for s in plan.steps for a in s.arguments if a not in s.things}
+    parts = {s: domain.recipes(s)[0].inputs for s in sorted(liquids) if domain.recipes(s)}
+    liquids |= {part for inputs in parts.values() for part in inputs}
     true = [a for a, value in facts.truth(_asked(domain, conditions, things, around, liquids)).items() if value]
     lines = [f"({a.predicate} {' '.join(a.arguments)})" for a in true]
     lines += [f"(in_hand {n} {hands[k]})" for k, n in enumerate(facts.held)]
@@ -150,6 +157,8 @@ def problem_pddl(name: str, facts: Facts, plan: TaskPlan) -> str:
     lines += [f"(container {n})" for n in things if domain.contains(n)]
     lines += [f"(fits {n} {other})" for n in things for other in domain.attachable(n) if other in things]
     lines += [f"(sprays {n})" for n in things if n in domain.sprays]
+    lines += [f"(stirs {n})" for n in things if n in domain.stirrers]
+    lines += [f"(part_of {part} {s})" for s, inputs in parts.items() for part in inputs]
     lines += [f"(absorbs {n})" for n in things if domain.absorbs(n)]
     for source in (s for s in domain.sources if s.name in things):
         lines += [f"(heats {source.name} {n})" for n in things if source in domain.heaters(n)]

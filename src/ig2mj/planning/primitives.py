@@ -16,6 +16,7 @@ from ig2mj.planning.doors import through_doors
 from ig2mj.planning.driving import drive_near, go
 from ig2mj.planning.filling import fill
 from ig2mj.planning.grasping import grasp, is_graspable, release
+from ig2mj.planning.mixing import mix
 from ig2mj.planning.moves import Primitive, PrimitiveFailed
 from ig2mj.planning.opening import set_open
 from ig2mj.planning.placing import bring_out, place
@@ -34,7 +35,7 @@ def primitive(world: PlannedWorld, step: Step) -> Primitive:
     return through_doors(world, step, _tried_again)
 
 
-BROUGHT_OUT = ("open", "close", "toggle_on", "toggle_off", "wipe", "scrub", "slice", "pour", "spray")
+BROUGHT_OUT = ("open", "close", "toggle_on", "toggle_off", "wipe", "scrub", "slice", "pour", "spray", "mix")
 """Primitives that are tried again on open floor, with things that can be carried there."""
 
 
@@ -103,6 +104,7 @@ ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {
     "freeze": freeze,
     "push": push,
     "spray": spray,
+    "mix": mix,
     "attach": attach,
 }
 """Primitives that are carried out in physics."""

@@ -90,6 +90,7 @@ class RequestSource:
             "fill": [n for n in self._loose if n in domain.fillable],
             "pour": [n for n in self._loose if n in domain.pourable],
             "attach": [n for n in self._loose if domain.attachable(n)],
+            "mix": [n for n in self._things if domain.contains(n) and domain.mixable],
             "slice": [n for n in self._loose if domain.has(n, "sliceable")] + [self._fruit],
             "cook": [n for n in self._loose if domain.has(n, "cookable")] + [self._meat],
             "freeze": [n for n in self._loose if domain.has(n, "freezable")] + [self._fruit],
@@ -110,6 +111,7 @@ class RequestSource:
             "fill": domain.taps,
             "pour": self._things,
             "spray": domain.sprays,
+            "mix": domain.stirrers,
             "attach": domain.attachable(name) if name else (),
         }
         if primitive in ("cook", "freeze"):
@@ -118,7 +120,8 @@ class RequestSource:
         if primitive not in second:
             return (name,) if name else None
         other = _one(second[primitive], rng)
-        last = (WATER,) if SUBSTANCE in PRIMITIVES[primitive].arguments else ()
+        substance = _one(domain.mixable, rng) if primitive == "mix" else WATER
+        last = (substance,) if SUBSTANCE in PRIMITIVES[primitive].arguments else ()
         return (name, other, *last) if name and other else None
 
     def _with(self, ability: str) -> list[str]:
@@ -153,6 +156,9 @@ class RequestSource:
         if primitive in ("pour", "spray"):
             container = name if primitive == "pour" else arguments[1]
             return [true("filled", container, WATER)], (container,)
+        if primitive == "mix":
+            recipe = self._domain.recipes(second)[0]
+            return [true("contains", name, part) for part in recipe.inputs], (arguments[1],)
         if primitive in ("cook", "freeze"):
             source = next(s for s in self._domain.sources if s.name == second)
             before = self._running(second) if source.needs_switch else []

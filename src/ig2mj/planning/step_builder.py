@@ -19,7 +19,7 @@ from ig2mj.planning.steps import PLACE, Step
 from ig2mj.planning.supplies import RECEIVED, Supply, supplies
 from ig2mj.sampling.conditions import Condition
 
-SUPPLIES = ("fill", "soak", "pour", "spray")
+SUPPLIES = ("fill", "soak", "pour", "spray", "mix")
 """Primitives that bring a substance into or onto an object."""
 
 CLEARED = 2
@@ -253,11 +253,15 @@ class StepBuilder:
             return
         if chosen.tap:
             self._hold_below_tap("fill", chosen.source)
+        for part in chosen.inputs:
+            self._supply(Condition(c.predicate, (name, part)))
         self._reach(name)
         self._set_down(name)
         self._take(chosen.source)
         if chosen.primitive == "pour":
             self._add("pour", chosen.source, name, substance, also=(c,))
+        elif chosen.primitive == "mix":
+            self._add("mix", name, chosen.source, substance, also=(c,))
         else:
             self._free_hand(chosen.source)
             self._add("spray", name, chosen.source, substance, also=(c,))

@@ -1,4 +1,5 @@
-"""`supplies`: ways in which an object gets a substance in one world: from a tap, out of a container, by a spray.
+"""`supplies`: ways in which an object gets a substance in one world: from a tap, out of a container, by a spray, or, in
+a container, by stirring what it is made of.
 
 Conditions about it are those of `RECEIVED`: a container is filled with it or contains it, and anything else is covered
 with it or, where it can absorb, saturated.
@@ -12,6 +13,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from ig2mj.knowledge.substances import WATER
+from ig2mj.knowledge.transitions import Transition
 from ig2mj.planning.facts import Facts
 from ig2mj.sampling.conditions import Condition
 from ig2mj.states.substances.coat import DROP
@@ -31,13 +33,14 @@ class Supply:
     """One way.
 
     Attributes:
-      primitive: that ends it. source: tap, container or spray. tap: where the container is filled first; "": it holds
-        enough.
+      primitive: that ends it. source: tap, container, spray or stirrer. tap: where the container is filled first; "":
+        it holds enough. inputs: substances that come into the container before it is stirred.
     """
 
     primitive: str
     source: str
     tap: str = ""
+    inputs: tuple[str, ...] = ()
 
 
 def litres(facts: Facts, name: str, substance: str) -> float:
@@ -83,13 +86,26 @@ def required_litres(facts: Facts, condition: Condition) -> float:
     return CONTAINS
 
 
-def supplies(facts: Facts, condition: Condition, required: Sequence[Condition] = ()) -> list[Supply]:
+def missing_parts(facts: Facts, name: str, recipe: Transition) -> list[str]:
+    """Substances of a recipe that a container does not contain."""
+    return [i for i in recipe.inputs if litres(facts, name, i) < CONTAINS]
+
+
+def ingredients(facts: Facts, name: str, substance: str) -> str:
+    """What a container lacks of the recipe of which it has most, in words; "": nothing."""
+    lacks = [missing_parts(facts, name, recipe) for recipe in facts.domain.recipes(substance)]
+    return ", ".join(min(lacks, key=len, default=["a recipe"]))
+
+
+def supplies(
+    facts: Facts, condition: Condition, required: Sequence[Condition] = (), within: Collection[str] = ()
+) -> list[Supply]:
     """The ways, those with fewest steps first, last those in which another container is filled at a tap; none: there is
     too little of the substance.
 
     Args:
       condition: that is to become true. required: conditions that are to hold in the end: what they ask for in a
-        container is not poured out of it.
+        container is not poured out of it. within: substances of which this one is to become a part.
     """
     domain, (name, substance) = facts.domain, condition.arguments
     container = condition.predicate in ("contains", "filled")
@@ -109,6 +125,9 @@ def supplies(facts: Facts, condition: Condition, required: Sequence[Condition] =
         jugs = [y for y in others if y in domain.fillable and y not in able and not _asked_of(y, WATER, required)]
         found += [Supply("pour", y, tap) for y in jugs for tap in domain.taps]
 
+    if container:
+        found += _mixtures(facts, name, substance, required, {*within, substance})
+
     def rank(supply: Supply) -> tuple[bool, int, bool, float]:
         kept = supply.primitive == "pour" and bool(_asked_of(supply.source, substance, required))
         order = -domain.litres(supply.source) if supply.tap else _far(facts, supply.source, name)
@@ -117,8 +136,26 @@ def supplies(facts: Facts, condition: Condition, required: Sequence[Condition] =
     return sorted(found, key=rank)
 
 
+def _mixtures(
+    facts: Facts, name: str, substance: str, required: Sequence[Condition], within: Collection[str]
+) -> list[Supply]:
+    """The ways of stirring, of recipes all of whose ingredients are there or can be brought there."""
+    found = list[Supply]()
+    for recipe in facts.domain.recipes(substance):
+        missing = missing_parts(facts, name, recipe)
+        if all(i not in within and supplies(facts, _part(name, i), required, within) for i in missing):
+            found += [Supply("mix", s, inputs=tuple(missing)) for s in facts.domain.stirrers if s != name]
+    return found
+
+
+def _part(name: str, substance: str) -> Condition:
+    return Condition("contains", (name, substance))
+
+
 def _steps(facts: Facts, name: str, supply: Supply) -> int:
     """Steps that a way takes, about."""
+    if supply.primitive == "mix":
+        return 1 + (supply.source not in facts.held) + 2 * len(supply.inputs)
     moved = name if supply.primitive in ("fill", "soak") else supply.source
     tap = supply.tap or (supply.source if supply.primitive in ("fill", "soak") else "")
     runs = not tap or not facts.domain.has(tap, "toggleable") or facts.holds("toggled_on", tap)

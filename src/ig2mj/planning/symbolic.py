@@ -20,6 +20,7 @@ from ig2mj.planning.domain import Domain, condition_of
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.problem import start_of
 from ig2mj.planning.steps import Outcome, PlanningError, Step
+from ig2mj.planning.supplies import ingredients, missing_parts
 from ig2mj.predicates.logic import Atom
 from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.conditions import Condition
@@ -27,7 +28,7 @@ from ig2mj.sampling.many import make_sampler
 from ig2mj.sampling.placement import Rejections
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.row import RowSampler
-from ig2mj.sampling.substance_setters import brought
+from ig2mj.sampling.substance_setters import brought, mixed
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.pool import Pool
@@ -156,12 +157,14 @@ class SymbolicRung:
             return f"the hands are full: {', '.join(held)}"
         if (kind.startswith("place_") or kind in ("release", "soak", "fill", "pour", "attach")) and name not in held:
             return f"no hand holds {name}"
-        if kind in ("wipe", "scrub", "slice", "spray") and second not in held:
+        if kind in ("wipe", "scrub", "slice", "spray", "mix") and second not in held:
             return f"no hand holds {second}"
         if kind == "scrub" and not facts.holds("soaked", second):
             return f"{second} is not soaked"
-        if kind in ("fill", "attach", *BRINGS) and (why := self._domain.impossible(step.adds[0])):
+        if kind in ("fill", "attach", "mix", *BRINGS) and (why := self._domain.impossible(step.adds[0])):
             return why
+        if kind == "mix" and (parts := ingredients(facts, name, last)):
+            return f"{name} lacks {parts} for {last}"
         if kind == "fill" and (things := facts.things_in(name)):
             return f"{', '.join(things)} {'are' if len(things) > 1 else 'is'} in {name}"
         if kind in BRINGS and not facts.holds("contains", tool := BRINGS[kind](step), last):
@@ -210,6 +213,11 @@ class SymbolicRung:
         """The failure, or None: the world is changed so that what the step adds holds."""
         if step.primitive in BRINGS and conditions is None:
             return self._bring(own, step)
+        if step.primitive == "mix" and conditions is None:
+            name, _, substance = step.arguments
+            recipe = next(r for r in self._domain.recipes(substance) if not missing_parts(self.facts(world), name, r))
+            own.states = mixed(self._domain.model, own.states, self._domain.index(name), recipe)
+            return None
         rng = np.random.default_rng([self._seed, self._first + world, own.count])
         rejected: Rejections = collections.Counter()
         self._sampler.start_from(own.physics, own.states)

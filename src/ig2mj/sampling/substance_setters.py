@@ -15,6 +15,7 @@ import numpy as np
 
 from ig2mj.errors import StateError
 from ig2mj.knowledge.substances import FILL, WATER
+from ig2mj.knowledge.transitions import Transition
 from ig2mj.states.definitions import wetness
 from ig2mj.states.model import StateModel
 from ig2mj.states.substances import coat, volume
@@ -136,6 +137,16 @@ def brought(
         lost=np.asarray(states.lost) + np.where(own, np.float32(lost), 0.0).astype(np.float32),
         drawn=np.asarray(states.drawn) + np.where(own & endless, np.float32(given), 0.0).astype(np.float32),
     )
+
+
+def mixed(model: StateModel, states: ExtendedStates, obj: int, recipe: Transition) -> ExtendedStates:
+    """The states after stirring: all inputs of a rule in a container have become its output, litre by litre."""
+    columns, row = [_column(model, name) for name in recipe.inputs], _row(model, obj)
+    now = np.asarray(states.volume)[0, row].astype(float)
+    for name in recipe.inputs:
+        states = volume.set_volume(model, states, obj, name, 0.0)
+    total = now[_column(model, recipe.output)] + now[columns].sum()
+    return volume.set_volume(model, states, obj, recipe.output, total)
 
 
 def _row(model: StateModel, obj: int) -> int:

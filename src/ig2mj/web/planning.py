@@ -268,6 +268,9 @@ def offers(
         found[f"Pour {substance} out of {tool}"] = ("pour", tool, name, substance)
         if tool in domain.sprays:
             found[f"Spray with {substance}"] = ("spray", name, tool, substance)
+    if tool in domain.stirrers and domain.contains(name):
+        for substance in domain.mixable:
+            found[f"Mix {substance} with {tool}"] = ("mix", name, tool, substance)
     if name in domain.attachable(tool):
         found[f"Attach {tool}"] = ("attach", tool, name)
     if domain.has(tool, "cookable") and domain.has(name, "heatSource"):

@@ -11,7 +11,7 @@ from ig2mj.planning.facts import Facts
 from ig2mj.planning.steps import PRIMITIVES, Step, make_step
 from ig2mj.planning.words.instruction import Instruction
 from ig2mj.planning.words.nouns import Lexicon, NotUnderstoodError, Phrase, Reader, choose
-from ig2mj.planning.words.treatment import bringing, treatment
+from ig2mj.planning.words.treatment import bringing, stirring, treatment
 from ig2mj.planning.words.verbs import (
     ADJECTIVES,
     CARRY,
@@ -138,6 +138,8 @@ class _Clauses:
             self._pour()
         elif kind == "spray":
             self._spray()
+        elif kind == "mix":
+            self._mix()
         else:
             self._treat(kind)
 
@@ -292,6 +294,20 @@ class _Clauses:
             if reader.take("with") and not (substance := self._substance(last=True)):
                 (spray,) = self._names(self._objects("a spray or a substance", single=True), "held")[:1]
         self.steps.extend(bringing(self.lexicon.facts, "spray", spray, target, substance) for target in targets)
+
+    def _mix(self) -> None:
+        """ "lemonade in the bowl", "the bowl with the spoon", "the bowl into lemonade"."""
+        reader, tool = self.reader, ""
+        substance = self._substance(last=True)
+        if substance and not reader.take("in", "inside"):
+            raise self._unknown("'in'")
+        (name,) = self._target() if substance else self._names(self._objects("a container", single=True))[:1]
+        if not substance and reader.take("into", "to"):
+            substance = self._substance(last=True)
+        if reader.take("with", "using"):
+            (tool,) = self._names(self._objects("what stirs", single=True), "held")[:1]
+        self.steps.append(stirring(self.lexicon.facts, name, tool, substance))
+        self.mentioned.append(Phrase("it", (name,), 0))
 
     def _substance(self, last: bool = False) -> str:
         """A substance in use that is named here, which is passed; "": none.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.steps import Step, make_step
-from ig2mj.planning.supplies import held_substances
+from ig2mj.planning.supplies import held_substances, ingredients
 from ig2mj.planning.words.nouns import NotUnderstoodError
 
 
@@ -66,6 +66,28 @@ def bringing(facts: Facts, kind: str, source: str, target: str, substance: str) 
     if reason := domain.impossible(step.adds[0]):
         raise NotUnderstoodError(f"cannot {kind} {target}: {reason}")
     return step
+
+
+def stirring(facts: Facts, name: str, tool: str, substance: str) -> Step:
+    """The step that stirs what a container holds.
+
+    Args:
+      tool: "": the first that can. substance: "": the first for which the container has what it takes.
+
+    Raises:
+      NotUnderstoodError: the container cannot contain it, nothing here stirs, or there is no recipe.
+    """
+    domain = facts.domain
+    if not domain.contains(name):
+        raise NotUnderstoodError(f"'{name}' is no container of substances")
+    able = [s for s in domain.stirrers if s != name]
+    if not able or (tool and tool not in able):
+        raise NotUnderstoodError(f"{tool or 'nothing here'} {'cannot stir' if tool else 'stirs'}")
+    ready = [s for s in domain.mixable if s == substance or not (substance or ingredients(facts, name, s))]
+    if not ready:
+        what = f"makes {substance}" if substance else f"is for what '{name}' contains"
+        raise NotUnderstoodError(f"no recipe that is stirred {what}")
+    return make_step("mix", (name, tool or able[0], ready[0]))
 
 
 def _cleaning(facts: Facts, kind: str, name: str) -> str:

@@ -23,6 +23,7 @@ _WORDS = {
     "fill": "fill|fill up",
     "pour": "pour|pour out|tip|spill",
     "spray": "spray|mist",
+    "mix": "mix|stir|whisk|blend",
     "attach": "attach|screw|mount|fasten|hang|hang up",
     "slice": "slice|cut|cut up|chop|chop up|halve",
     "cook": "cook|fry|bake|roast|boil|grill",
