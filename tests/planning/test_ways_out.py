@@ -1,13 +1,18 @@
 """Where a way begins, and from which height an object is dropped, where there is little room."""
 
+from typing import cast
+
 import numpy as np
 import pytest
 
 from ig2mj.geometry.host_rotations import about_vertical
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.free_floor import POCKET, FreeFloor
+from ig2mj.planning.grasping import _off_furniture
+from ig2mj.planning.moves import RETREAT
 from ig2mj.planning.occupancy import RESOLUTION, Occupancy
-from ig2mj.planning.placing import DEEP_DROPS, _drop
+from ig2mj.planning.phases import Until
+from ig2mj.planning.placing import DEEP_DROPS, _drawn_back, _drop
 from ig2mj.planning.spots import ends_down
 from ig2mj.planning.world import PlannedWorld
 
@@ -63,6 +68,10 @@ class _Bucket(Obstacles):
         across = np.hypot(spheres[:, 0], spheres[:, 1]) + spheres[:, 3]
         return not ((spheres[:, 2] < 0.25) & (across > 0.1)).any()
 
+    def distance(self, points):
+        across = np.hypot(points[:, 0], points[:, 1])
+        return np.where(points[:, 2] < 0.25, 0.1 - across, np.inf)
+
     def clear_along(self, spheres, start, ahead, along):
         return all(self.clear(spheres + np.array([*(start + t * ahead), 0.0])) for t in along)
 
@@ -73,6 +82,19 @@ def test_an_object_falls_from_the_lowest_height_at_which_the_hand_has_room():
     assert _drop(_Bucket(), np.array([held]), goal, DEEP_DROPS) == 0.0
     assert _drop(_Bucket(), np.array([hand, held]), goal, DEEP_DROPS) == 0.16
     assert _drop(_Bucket(), np.array([hand, held]), goal, (0.0, 0.05)) is None
+
+
+def test_a_hand_that_has_let_go_is_drawn_back_as_far_as_it_has_room_behind_it():
+    hand, palm, up = np.array([[0.0, 0.0, 0.0, 0.03]]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    over, deep = np.array([0.0, 0.0, 0.3]), np.array([0.0, 0.0, 0.05])
+
+    def back(target, palm):
+        return list(np.round(_drawn_back(_Bucket(), hand, target, palm) - target, 6))
+
+    assert back(over, palm) == [-RETREAT, 0, 0]  # above the bucket
+    assert back(deep, -up) == [0, 0, RETREAT]  # in it, with room above
+    assert back(deep, palm) == [-RETREAT / 2, 0, 0]  # 7 cm from its side
+    assert back(deep - 0.065 * palm, palm) == [0, 0, 0]  # at its side
 
 
 class _Held(PlannedWorld):
@@ -104,3 +126,19 @@ def test_what_is_long_is_put_with_an_end_first_that_away_from_the_hand_before_th
 
 def test_what_is_not_longer_than_wide_has_no_end():
     assert ends_down(_Held(0.1, 0.1, 0.1), "", 0) == []
+
+
+class _Caught:
+    """A world in which the second hand has closed on furniture, until it is opened."""
+
+    def __init__(self):
+        self.held, self.domain = ["spoon_0", "cabinet_0"], self
+
+    def fixed(self, name):
+        return name == "cabinet_0"
+
+
+def test_a_hand_that_has_closed_on_furniture_lets_go_of_it_and_others_hold_on():
+    (program,) = _off_furniture(cast(PlannedWorld, _Caught()))
+    assert {phase.hand for phase in program} == {1}
+    assert program[0].close is False and program[0].until == Until.EMPTY and program[-1].reset

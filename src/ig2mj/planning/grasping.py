@@ -91,6 +91,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
     for attempt in range(attempts):
         if nowhere and nowhere >= world.held.count(""):  # no hand finds a way
             break
+        yield from _off_furniture(world)
         hand = free_hand(world, attempt)
         if prefers is None and name in world.domain.tools and world.body.opening is None:
             prefers = functools.partial(_leaves_free, world, name)
@@ -126,6 +127,13 @@ def held_again(world: PlannedWorld, name: str) -> Generator[Program, str, bool]:
     if name in world.held:
         return True
     return (yield from grasp(world, Step("grasp", (name,)))).done
+
+
+def _off_furniture(world: PlannedWorld) -> Generator[Program, str, None]:
+    """Hands let go of doors and drawers: one that ran into a drawer has lost what it held, and closed on that."""
+    for hand, name in enumerate(world.held):
+        if name and world.domain.fixed(name):
+            yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=15, after=""), *rest(hand)]
 
 
 def _leaves_free(world: PlannedWorld, name: str, pose: GraspPose) -> float:

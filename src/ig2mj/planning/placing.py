@@ -59,6 +59,9 @@ DROPS = {"inside": DEEP_DROPS, "on_top": LOW_DROPS, "on_floor": LOW_DROPS, "next
 FALLS_OVER, FALLING = ("on_floor", "on_top", "inside"), 15
 """Placements that stay true where an object falls over, and agent steps that it falls."""
 
+CLOSER = 0.005
+"""m by which a hand that is drawn back may come closer to what is around than it is."""
+
 UNDER = 0.85
 """m, horizontal, that the base of hands that float would like to be from what is put below something: it is let down
 before that, and goes straight in."""
@@ -91,7 +94,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             found, also = yield from _find(world, predicate, step, hand, opened, until)
             if isinstance(found, str):
                 reason, detail = _lacking(found), f"{found} {predicate}({name}, {where}) would be true"
-                if found == _NO_SPOT and not righted:
+                if found != _NO_STANCE and not righted:
                     righted = True
                     if (yield from _set_upright(world, where)):
                         continue
@@ -109,7 +112,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             if planned is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
-            start, way, target, quat, palm = planned
+            start, way, target, quat, back = planned
             keeps, turned = world.index(name), quaternion(quat)
             reason = yield [
                 *turn_at(world, hand, start, turned, keeps),
@@ -118,7 +121,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                       limit=20, after="", speed=0.03),
                 Phase(hand=hand, close=False, until=Until.EMPTY, limit=10),
                 Phase(hand=hand, close=False, until=Until.WAITED, limit=OPENS),
-                Phase(hand=hand, pos=vector3(target - RETREAT * palm), tolerance=0.04, limit=15, after=""),
+                Phase(hand=hand, pos=vector3(back), tolerance=0.04, limit=15, after=""),
                 *travel(hand, [*way[-2::-1], start], None),
                 *rest(hand),
                 Phase(until=Until.WAITED, limit=6 if spot.drop == 0.0 else FALLING),
@@ -140,8 +143,8 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
 def _way(
     world: PlannedWorld, name: str, hand: int, spot: Spot
 ) -> tuple[Vector, list[Vector], Vector, Sequence[float] | np.ndarray, Vector] | None:
-    """Where a hand turns what it holds, its way from there, where it lets go, and its orientation and the direction of
-    its palm there, from where the robot stands; None: there is no way."""
+    """Where a hand turns what it holds, its way from there, where it lets go, its orientation there, and where it goes
+    back to then, from where the robot stands; None: there is no way."""
     _, yaw = world.base
     target, quat, rotation = grip_for(world, hand, name, spot)
     fingers, palm = world.hand_axes(hand, rotation)
@@ -151,7 +154,25 @@ def _way(
     start = turning_point(obstacles, spheres, world.grip(hand), yaw)
     follows = world.follows(hand, quat, obstacles)
     way = hand_path(obstacles, spheres, start, target, [UP, -ahead(yaw)], SPARE, True, follows)
-    return None if way is None else (start, way, target, quat, palm)
+    if way is None:
+        return None
+    return start, way, target, quat, _drawn_back(obstacles, world.spheres(fingers, palm), target, palm)
+
+
+def _drawn_back(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], target: Vector, palm: Vector) -> Vector:
+    """Where a hand that has let go at `target` is drawn back to, off what it held: where it stays itself if it has less
+    room behind, as between the sides of a container, which it would press what it held against.
+
+    Args:
+      spheres: of the hand alone.
+    """
+
+    def room(point: Vector) -> float:
+        return float((obstacles.distance(spheres[:, :3] + point) - spheres[:, 3]).min())
+
+    least = min(room(target), 0.0) - CLOSER
+    backs = (target - share * RETREAT * palm for share in (1.0, 0.5, 0.25))
+    return next((back for back in backs if room(back) > least), target)
 
 
 def _find(
