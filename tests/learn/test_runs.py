@@ -26,16 +26,18 @@ from ig2mj.learn.bc import BCConfig
 from ig2mj.learn.best import BEST, COUNTED, LAST, SUCCESS, Best
 from ig2mj.learn.checkpoints import Checkpoints, only_run
 from ig2mj.learn.dagger import DaggerConfig
+from ig2mj.learn.iteration import OneDevice
 from ig2mj.learn.networks import ConvEncoder
 from ig2mj.learn.occlusion import OcclusionConfig
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_on
 from ig2mj.learn.ppo import PPO, PPOConfig
+from ig2mj.learn.replay import Replay
 from ig2mj.learn.sac import SAC, SACConfig
 from ig2mj.learn.settings import configure_all, configured, written
 from ig2mj.learn.train import Run, train
 from ig2mj.process.compilation import XLA_EVENT
-from ig2mj.process.gc_pause import Compiled
+from ig2mj.process.gc_pause import Compiled, PendingCall
 
 CONFIG = PPOConfig(rollout_length=4, minibatches=1, epochs=1, actor_layers=(16,), critic_layers=(16,))
 
@@ -290,7 +292,8 @@ def test_a_checkpoint_of_version_0_1_is_refused_with_the_version_that_reads_it(d
         train(env, algorithm(env), Run(iterations=30, out=tmp_path / "old", resume=True, quiet=True))
 
 
-def test_an_iteration_is_compiled_together_with_the_start_where_kernels_are_awaited(monkeypatch):
+@pytest.mark.parametrize("programs", [["jit(whole)"], ["jit(collect)", "jit(learn)"]])
+def test_an_iteration_is_compiled_together_with_the_start_where_kernels_are_awaited(programs, monkeypatch):
     class Awaiting(PointMass):
         """Offers its start's program, as an environment does whose engine is loading kernels."""
 
@@ -307,6 +310,38 @@ def test_an_iteration_is_compiled_together_with_the_start_where_kernels_are_awai
     reset = env.reset
     monkeypatch.setattr(env, "reset", lambda seed: (once.append(list(compiled)), reset(seed))[1])
     jax.monitoring.register_event_duration_secs_listener(note)
-    result = train(env, algorithm(env), Run(iterations=2, quiet=True))
-    assert "jit(whole)" in once[0] and compiled.count("jit(whole)") == 1, "the call finds what was compiled"
+    result = train(env, algorithm(env), Run(iterations=2, programs=len(programs), quiet=True))
+    for program in programs:
+        assert program in once[0] and compiled.count(program) == 1, "the call finds what was compiled"
+    assert compiled.count("jit(init)") == 1
     assert result.compile_s > 0
+
+
+def test_an_iteration_is_traced_while_the_new_learner_is_compiled(monkeypatch):
+    done = list[str]()
+
+    class Noting(PendingCall):
+        def result(self):
+            done.append("learner")
+            return super().result()
+
+    monkeypatch.setattr("ig2mj.learn.train.PendingCall", Noting)
+    monkeypatch.setattr(OneDevice, "compile_beforehand", lambda self, learner, *_: done.append(type(learner).__name__))
+    env, ours = PointMass(8), algorithm(PointMass(8))
+    result = train(env, ours, Run(iterations=1, quiet=True))
+    assert done == [type(result.learner).__name__, "learner"], "shapes are enough"
+
+
+def test_a_buffer_is_one_program(monkeypatch):
+    compiled = list[str]()
+
+    def note(event: str, duration_secs: float, **about: str | int) -> None:
+        if event == XLA_EVENT:
+            compiled.append(str(about.get("fun_name")))
+
+    perception = Perception(PointMass(8).observation_spaces)
+    jax.monitoring.register_event_duration_secs_listener(note)
+    jax.clear_caches()
+    replay = Replay.empty(12, 24, perception, 2, 2)
+    assert compiled == ["jit(made)"]
+    assert replay.vector.shape == (12, 24, perception.vector_size) and not np.asarray(replay.label).any()

@@ -155,8 +155,9 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
         gpus = gpus if devices == "all" else gpus[: int(devices)]
         if len(gpus) > 1 and devices in ("all", str(len(gpus))):
             return run_on_each_gpu(gpus, [sys.executable, "-m", "ig2mj", *sys.argv[1:]], os.environ)
-    of_homes = settings_of(algo, changes, quiet=True)[0].homes
-    if devices != "1" or (topology and topology.count > 1) or of_homes:  # an iteration is several programs
+    settings = settings_of(algo, changes, quiet=True)[0]
+    spread = devices != "1" or (topology and topology.count > 1)
+    if spread or settings.homes or settings.programs > 1:  # an iteration is several programs
         keep_scratch_in_place()
     team = Team.join(topology)
     with team.together():

@@ -62,16 +62,19 @@ class ImitationBuffer:
         Args:
           remembered: m. predictions: g; 0 where predictions are not kept. groups: of worlds that are stepped in turn.
         """
-        return cls(
-            vector=jnp.zeros((steps, worlds, perception.vector_size)),
-            image=jnp.zeros((steps, worlds, perception.image_bytes), jnp.uint8),
-            label=jnp.zeros((steps, worlds, action_size)),
-            **RingHeads.empty(groups).fields,
-            remembered=jnp.zeros((steps, worlds, remembered)),
-            prediction=jnp.zeros((steps, worlds, predictions)),
-            unlabelled=unlabelled,
-            shown=shown,
-        )
+
+        @jax.jit  # one program, not one for each array
+        def zeros() -> dict[str, Array]:
+            return {
+                "vector": jnp.zeros((steps, worlds, perception.vector_size)),
+                "image": jnp.zeros((steps, worlds, perception.image_bytes), jnp.uint8),
+                "label": jnp.zeros((steps, worlds, action_size)),
+                **RingHeads.empty(groups).fields,
+                "remembered": jnp.zeros((steps, worlds, remembered)),
+                "prediction": jnp.zeros((steps, worlds, predictions)),
+            }
+
+        return cls(**zeros(), unlabelled=unlabelled, shown=shown)
 
     def insert(
         self,

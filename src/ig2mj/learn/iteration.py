@@ -8,6 +8,7 @@ Axes: W worlds, T steps.
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Protocol, runtime_checkable
@@ -94,13 +95,13 @@ class OneDevice:
                 env, algorithm.perception, algorithm.act, algorithm.adviser, learner, play, key, algorithm.length
             )
 
-        self.learn = jax.jit(learn, donate_argnums=(0, 1))
+        self.learn = Compiled(learn, donate_argnums=(0, 1))
         if env.pure:
-            program = jax.jit(collect, donate_argnums=1)
+            self._collect = Compiled(collect, donate_argnums=1)
 
             def timed(learner: Any, play: Play, key: Array) -> Any:
                 began = time.perf_counter()
-                found = jax.block_until_ready(program(learner, play, key))
+                found = jax.block_until_ready(self._collect(learner, play, key))
                 return *found, time.perf_counter() - began
 
             self.play: Callable[..., tuple[Play, Any, dict[str, Any], float]] = timed
@@ -117,14 +118,26 @@ class OneDevice:
         return begin(self._env, self._algorithm.acting_state(self.num_worlds), seed)
 
     def compile_beforehand(self, learner: Any, buffer: Any, key: Array, seed: int) -> None:
-        """Compiles the iteration together with what `begin(seed)` runs, while the engine's kernels are being loaded."""
+        """Compiles the iteration together with what `begin(seed)` runs, while the engine's kernels are being loaded.
+
+        Arrays may be shapes.
+        """
         pending = getattr(self._env, "pending_programs", None)
         programs = pending(seed) if pending is not None else []
-        if programs and self._whole is not None:
+        if programs:
             acting = self._algorithm.acting_state(self.num_worlds)
             play = started(programs[0].returned, acting, self.num_worlds)
-            whole = self._whole.traced(learner, buffer, play, key, jnp.float32(0.0), jnp.bool_(False))
-            compile_together([whole, *programs])
+            compile_together(itertools.chain(self._programs(learner, buffer, play, key), programs))
+
+    def _programs(self, learner: Any, buffer: Any, play: Any, key: Array) -> Iterator[Traced]:
+        """Of an iteration, each traced when it is asked for."""
+        last = key, jnp.float32(0.0), jnp.bool_(False)
+        if self._whole is not None:
+            yield self._whole.traced(learner, buffer, play, *last)
+            return
+        collect = self._collect.traced(learner, play, key)
+        yield collect
+        yield self.learn.traced(learner, buffer, collect.returned[1], *last)
 
     def place(self, learner: Any, buffer: Any) -> tuple[Any, Any]:
         """Learner and buffer as arrays on the device."""

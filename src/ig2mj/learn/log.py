@@ -9,6 +9,8 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
+from ig2mj.learn.event_file import EventFile
+
 LOSSES = 3
 """So many losses stand in a line of the terminal, before an episode has ended."""
 
@@ -20,26 +22,19 @@ class Log:
         self,
         run: str | os.PathLike | None,
         *,
-        tensorboard: bool = True,
         quiet: bool = False,
         minutes: float | None = None,
     ):
         """
         Args:
-          run: the folder; None: only the terminal. tensorboard: also for TensorBoard, where tensorboardX is installed.
-          quiet: nothing on the terminal. minutes: of the run, for the lines on the terminal.
+          run: the folder; None: only the terminal. quiet: nothing on the terminal.
+          minutes: of the run, for the lines on the terminal.
         """
         self._folder = None if run is None else pathlib.Path(run)
         self._quiet, self._board, self._minutes = quiet, None, minutes
         if self._folder is not None:
             self._folder.mkdir(parents=True, exist_ok=True)
-            if tensorboard:
-                try:
-                    from tensorboardX import SummaryWriter
-                except ModuleNotFoundError:
-                    print("no TensorBoard file: the package tensorboardX is not installed", file=sys.stderr)
-                else:
-                    self._board = SummaryWriter(str(self._folder), flush_secs=10)
+            self._board = EventFile(self._folder)
 
     def forget_after(self, seconds: float) -> None:
         """Drops the rows after a checkpoint, which a resumed run writes again."""
@@ -57,16 +52,10 @@ class Log:
         if self._file is not None:
             self._append(self._file, {k: _number(v) for k, v in values.items()})
         if self._board is not None:
-            for name, value in values.items():
-                if value is not None and name != "env_steps":
-                    self._board.add_scalar(name, value, int(values["env_steps"] or 0))
+            points = {name: value for name, value in values.items() if value is not None and name != "env_steps"}
+            self._board.add(int(values["env_steps"] or 0), points)
         if not self._quiet:
             print(_line(values, self._minutes), file=sys.stderr, flush=True)
-
-    def close(self) -> None:
-        """Ends TensorBoard's file."""
-        if self._board is not None:
-            self._board.close()
 
     @property
     def _file(self) -> pathlib.Path | None:

@@ -117,18 +117,22 @@ class Replay:
         def zeros(*tail: int, dtype: type = jnp.float32) -> Array:
             return jnp.zeros((steps, worlds, *tail), dtype)
 
-        return cls(
-            vector=zeros(perception.vector_size),
-            image=zeros(bytes_, dtype=jnp.uint8),
-            action=zeros(action_size),
-            reward=zeros(),
-            terminated=zeros(dtype=jnp.bool_),
-            truncated=zeros(dtype=jnp.bool_),
-            after_vector=zeros(perception.vector_size),
-            after_image=zeros(bytes_, dtype=jnp.uint8),
-            label=zeros(label_size),
-            **RingHeads.empty(groups).fields,
-        )
+        @jax.jit  # one program, not one for each array
+        def made() -> Replay:
+            return cls(
+                vector=zeros(perception.vector_size),
+                image=zeros(bytes_, dtype=jnp.uint8),
+                action=zeros(action_size),
+                reward=zeros(),
+                terminated=zeros(dtype=jnp.bool_),
+                truncated=zeros(dtype=jnp.bool_),
+                after_vector=zeros(perception.vector_size),
+                after_image=zeros(bytes_, dtype=jnp.uint8),
+                label=zeros(label_size),
+                **RingHeads.empty(groups).fields,
+            )
+
+        return made()
 
     @classmethod
     def of_demos(cls, demos: Demos, labelled: bool = False) -> Replay:

@@ -32,6 +32,7 @@ from ig2mj.learn.progress import EPISODES, Window
 from ig2mj.learn.settings import old_names_work
 from ig2mj.learn.several_devices import ManyDevices
 from ig2mj.process import entry_point
+from ig2mj.process.gc_pause import Compiled, PendingCall
 from ig2mj.tasks.custom.code import shown
 
 
@@ -126,7 +127,14 @@ class _Training:
         self.file = None if code is None else code.file
         self.depends = {**depends, "algorithm": algorithm.name, "settings": settings, "save_buffer": run.save_buffer}
         first_key, self.key = jax.random.split(jax.random.PRNGKey(run.seed))
-        self.learner = jax.jit(algorithm.init)(first_key) if learner is None else learner
+        self.untrained: PendingCall | None = None
+        """Makes the learner, of which `learner` has only the shapes until then."""
+        if learner is None:
+            self.untrained = PendingCall(Compiled(algorithm.init), first_key)
+            learner = self.untrained.returned
+            if devices or run.resume:
+                learner, self.untrained = self.untrained.result(), None
+        self.learner = learner
         several = getattr(env, "envs", ())
         if several and devices:
             raise Ig2mjError("several homes are for one device (--devices 1)")
@@ -184,10 +192,14 @@ class _Training:
     def until_stopped(self, kept: Callable[[Any, dict[str, Any]], None], compiled: Callable[[], None]) -> Result:
         """Iterations until the run is over; see `train`."""
         run, team, worlds = self.run, self.team, self.step.num_worlds
-        self.learner, self.buffer = self.step.place(same(self.learner, team), self.buffer)
         beforehand = time.monotonic()
+        if self.untrained is None:
+            self.learner, self.buffer = self.step.place(same(self.learner, team), self.buffer)
         if isinstance(self.step, OneDevice | SeveralHomes):
             self.step.compile_beforehand(self.learner, self.buffer, self.key, run.seed + self.iteration)
+        if self.untrained is not None:
+            self.learner, self.untrained = same(self.untrained.result(), team), None
+            self.learner, self.buffer = self.step.place(self.learner, self.buffer)
         beforehand = time.monotonic() - beforehand
         with team.turns():
             play = self.step.begin(run.seed + self.iteration)  # a resumed run has other starts
@@ -233,7 +245,6 @@ class _Training:
                     kept(self.learner, {"seconds": self.clock, "env_steps": self.env_steps, "counted": counted, **row})
                 team.barrier(f"saved {self.iteration}")
             if stopped:
-                self.log.close()
                 return Result(self.learner, row, self.iteration, compile_s, stopped)
         raise AssertionError
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import contextlib
+import functools
 import gc
 import threading
 from collections.abc import Callable, Iterable
@@ -136,3 +137,22 @@ def compile_together(programs: Iterable[Traced]) -> None:
     """
     for compiling in [program.compiling() for program in programs]:
         compiling.result()
+
+
+class PendingCall:
+    """A call of a program that is compiled in a thread while others are traced.
+
+    Attributes:
+      returned: shapes of the values that it returns.
+    """
+
+    def __init__(self, program: Compiled, *args: Any):
+        traced = program.traced(*args)
+        self.returned = traced.returned
+        self._compiling = traced.compiling()
+        self._call = functools.partial(program, *args)
+
+    def result(self) -> Any:
+        """Waits until the program is compiled, and runs it."""
+        self._compiling.result()
+        return self._call()
