@@ -10,7 +10,7 @@ import pytest
 
 from ig2mj.planning import grasping, taps
 from ig2mj.planning.steps import Outcome
-from ig2mj.planning.world import HANGS, HIGHEST, RAISED, PlannedWorld
+from ig2mj.planning.world import HANGS, HIGHEST, RAISED, TALL, PlannedWorld
 
 GRIP = np.array([0.5, 0.0, 0.9])
 
@@ -28,7 +28,7 @@ class Carrying(PlannedWorld):
 
 
 def test_what_hangs_below_a_floating_hand_is_carried_higher():
-    flat, hanging, low = (Carrying(b).carry(0)[2] for b in (HANGS, HANGS + 0.2, 2.0))
+    flat, hanging, low = (Carrying(b).carry(0)[2] for b in (0.9 * TALL, HANGS + TALL, 2.0))
     assert flat == pytest.approx(0.5)
     assert hanging == pytest.approx(0.7)
     assert low == pytest.approx(0.5 + RAISED)

@@ -24,7 +24,7 @@ from ig2mj.planning.world import DirtSpot, PlannedWorld, Rotation, Stance, Vecto
 STROKES = 8
 """Places of the tool for each stance, at most."""
 
-PRESSED, LIFTED, CLOSE, SLACK = 0.02, 0.06, 0.035, 0.0
+PRESSED, LIFTED, CLOSE, SLACK = 0.02, 0.06, 0.03, 0.0
 """m that a tool is pressed into a face, and is lifted off it, also where there is less room; by which particles may be
 outside of its box."""
 
@@ -167,23 +167,11 @@ def _turned_regions(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
     rotations = [facing, carried] if held.has_area else [facing]
     if world.body.opening is not None:
         return [Region.turned(r, points) for r in _of_arm(held, yaw, normal, facing, carried)]
-    if held.has_area:
-        aligned = turn_about(normal, _askew(points @ facing.T, normal)) @ facing
-        rotations += [aligned, turn_about(normal, np.pi / 2) @ aligned]
     rotations += [turn_about(normal, angle) @ facing for angle in TURNS]
     tilts = [turn_about(axis, angle) for axis in axes_along(normal, aside(yaw)) for angle in TILTS]
     rotations += [tilt @ facing for tilt in tilts] + [tilt @ turn_about(normal, np.pi / 2) @ facing for tilt in tilts]
     found = [Region.turned(r, points) for r in rotations]
     return found + [dataclasses.replace(r, lifted=CLOSE) for r in found]
-
-
-def _askew(points: Float[np.ndarray, "n 3"], normal: Vector) -> float:
-    """rad about a face's normal by which a tool is turned so that its box along the face is smallest: it fits between
-    bars, and next to what stands on the face."""
-    u, v = (points @ axis for axis in axes_along(normal))
-    angles = np.deg2rad(np.arange(0.0, 90.0, 2.0))
-    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
-    return float(angles[int(np.argmin(np.ptp(c * u - s * v, axis=1) * np.ptp(s * u + c * v, axis=1)))])
 
 
 def _of_arm(held: HeldTool, yaw: float, normal: Vector, facing: Rotation, carried: Rotation) -> list[Rotation]:

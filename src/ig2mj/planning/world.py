@@ -37,9 +37,9 @@ CARRIED = 0.03
 BODY_SPARE = 0.04
 """m that are left between the body and what it carries."""
 
-HANGS, RAISED, HIGHEST = 0.05, 0.35, 1.85
-"""m below a floating hand that what it carries may hang before it is carried higher; by which it is, at most; and
-height of its top then, at most, which passes below the heads of doors."""
+TALL, HANGS, RAISED, HIGHEST = 0.2, 0.05, 0.35, 1.85
+"""m below a floating hand from which on what it carries is carried higher, and that it then hangs below where others
+are carried; by which it is, at most; and height of its top then, at most, which passes below the heads of doors."""
 
 WIDE = 0.25
 """m, half the diagonal of what a floating hand carries, from which on it is carried in front of the body's middle."""
@@ -325,6 +325,8 @@ class PlannedWorld:
     def _raised(self, hand: int, low: float, high: float) -> float:
         """m by which a hand carries what reaches from a height to another higher than other things."""
         grip = float(self.grip(hand)[2])
+        if grip - low < TALL:
+            return 0.0
         room = HIGHEST - (self.body.stands + float(self.body.carry[hand][2]) + high - grip)
         return float(np.clip(grip - low - HANGS, 0.0, max(min(room, RAISED), 0.0)))
 
