@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import ig2mj
 from ig2mj.agents.registry import make_robot
 from ig2mj.cli.common.planning import domain_of, expression_of
+from ig2mj.planning import pouring
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.grounding import ground_steps
 from ig2mj.planning.kinematic import kinematic_episodes
@@ -19,6 +22,7 @@ from ig2mj.planning.steps import Outcome, PlanningError, Step, UnsupportedPrimit
 from ig2mj.planning.symbolic import SymbolicRung, start_facts, symbolic_episodes
 from ig2mj.planning.task_planner import TaskPlanner
 from ig2mj.planning.words import NotUnderstoodError, tools
+from ig2mj.planning.world import PlannedWorld
 from ig2mj.states.substances.containers import Containers
 from ig2mj.states.substances.volume import FILLED
 from ig2mj.web.planning import offers
@@ -150,7 +154,7 @@ def test_pages_requests_functions_and_ground_steps_have_it():
     (schema,) = [t for t in tools(found.scene.tables, ["water"]) if t["function"]["name"] == "pour"]
     properties = schema["function"]["parameters"]["properties"]
     assert properties["substance"]["enum"] == ["water"] and "mug_0" in properties["target"]["enum"]
-    source = RequestSource(known, (*known.tools[:1], *known.knives[:1], "apple_0", "fish_0"))
+    source = RequestSource(known, (*known.tools[:1], *known.knives[:1], "apple_0", "fish_0", "spray", "bulb", "lamp"))
     drawn = [source.draw("pour", np.random.default_rng(seed)) for seed in range(20)]
     assert {request.step.arguments[0] for request in drawn if request is not None} <= set(known.pourable)
 
@@ -202,3 +206,42 @@ def test_a_towel_in_a_drawer_is_brought_out_and_soaked_though_it_lies_upside_dow
         outcome = simulation.agent.do(*request.split())
         assert outcome.done, f"{request}: {outcome}"
     assert simulation.predicate("saturated", "dishtowel_0", "water")
+
+
+@pytest.mark.parametrize("falls", [True, False])
+def test_a_target_that_has_fallen_over_is_set_up_before_it_is_poured_into(monkeypatch, falls):
+    class World(PlannedWorld):
+        held = property(lambda self: ["bowl"])  # pyright: ignore
+        facts = property(lambda self: None)  # pyright: ignore
+
+    world = object.__new__(World)
+    world.domain = SimpleNamespace(impossible=lambda wish: "")  # pyright: ignore
+    lies, poured, righted = [True], [], []
+
+    def set_upright(world, target):
+        yield []
+        righted.append(target)
+        lies[0] = falls
+        return not falls
+
+    def hold_at(world, name, hand, left):
+        yield []
+        return "", [np.zeros(3)], left()[0].number
+
+    def turned_over(world, step, hand, number):
+        yield []
+        poured.append(number)
+        return ""
+
+    changes = {
+        "hand_with": lambda world, name: 0, "litres": lambda *_: 1.0, "set_upright": set_upright, "hold_at": hold_at,
+        "_above": lambda *_: [] if lies[0] else [SimpleNamespace(number=0)], "_turned_over": turned_over,
+        "_holds": lambda world, step: bool(poured), "carry": lambda *_: None,
+    }  # fmt: skip
+    for name, change in changes.items():
+        monkeypatch.setattr(pouring, name, change)
+    running = pouring.pour(world, Step("pour", ("bowl", "mug", "water")))
+    with pytest.raises(StopIteration) as ended:
+        while True:
+            next(running)
+    assert righted == ["mug"] and ended.value.value.done != falls and len(poured) == (not falls)

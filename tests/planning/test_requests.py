@@ -1,14 +1,20 @@
 """Requests that are drawn to measure primitives, and the figures that are made of their results."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ig2mj.cli import call
 from ig2mj.cli.common.plan_benchmark import figure_cells, primitive_figures
+from ig2mj.knowledge.substances import WATER
 from ig2mj.planning.domain import Domain
-from ig2mj.planning.requests import MEASURED, RequestSource
+from ig2mj.planning.requests import MEASURED, Request, RequestSource, added_to
+from ig2mj.planning.steps import Outcome, Step
+from ig2mj.sampling.conditions import Condition
+from ig2mj.sampling.many import make_sampler
+from ig2mj.scene.scene import load_scene
 from ig2mj.simulation.requests import RequestBench
 from ig2mj.states.model import StateModel
 
@@ -16,7 +22,7 @@ from ig2mj.states.model import StateModel
 @pytest.fixture(scope="module")
 def source(tiny_home):
     domain = Domain(StateModel.of_manifest(tiny_home.tables, tiny_home.manifest))
-    return RequestSource(domain, (*domain.tools[:1], *domain.knives[:1], "apple", "apple"))
+    return RequestSource(domain, (*domain.tools[:1], *domain.knives[:1], "apple", "apple", "spray", "bulb", "lamp"))
 
 
 def drawn(source, primitive, count=30):
@@ -31,6 +37,56 @@ def test_requests_are_the_same_for_a_seed_and_name_things_of_the_right_kind(sour
     found = drawn(source, primitive)
     assert found and found == drawn(source, primitive)
     assert all(r.step.primitive == primitive for r in found)
+
+
+@pytest.fixture(scope="module")
+def kitted():
+    """Requests in a home with what is added to it."""
+    own = load_scene("small_home").object_names
+    scene = load_scene("small_home", objects=added_to(own))
+    domain = Domain(make_sampler(scene).model)
+    wholes = np.flatnonzero(scene.tables.object_part_of < 0)
+    names = [n for o in wholes if (n := scene.tables.object_names[o]) not in own]
+    return RequestSource(domain, names)
+
+
+def test_every_home_has_something_to_spray_with_and_something_to_attach(kitted):
+    sprays, attached = drawn(kitted, "spray"), drawn(kitted, "attach")
+    assert len(sprays) == len(attached) == 30
+    for request in sprays:
+        spray = request.step.arguments[1]
+        assert request.taken == (spray,) and Condition("filled", (spray, WATER)) in request.before
+    for request in attached:
+        bulb, lamp = request.step.arguments
+        placed = {c.arguments[0] for c in request.before if c.is_placement}
+        assert request.taken == (bulb,) and placed == {bulb, lamp}
+
+
+def test_water_is_poured_onto_what_has_an_upper_side(kitted):
+    targets = {r.step.arguments[1] for r in drawn(kitted, "pour", 200)}
+    assert len(targets) > 10 and not any(n.startswith(("door", "window")) for n in targets)
+
+
+def test_added_things_are_numbered_after_those_of_the_home():
+    pair = next(text for text in added_to(["light_bulb_0", "table_lamp_4", "table_lamp_old"]) if "attached" in text)
+    assert pair.endswith("light_bulb_1>table_lamp_5")
+
+
+def test_a_request_is_not_prepared_if_what_must_hold_first_does_not_last(monkeypatch):
+    bench = object.__new__(RequestBench)
+    before = (Condition("filled", ("glass_0", WATER)),)
+    request = Request(Step("pour", ("glass_0", "bowl_0", WATER)), before, ("glass_0",))
+    holds = [True]
+    facts = SimpleNamespace(holds=lambda *_: holds[0])
+    rung = SimpleNamespace(begin=lambda *_: None, advance=lambda: {0: Outcome()}, facts=lambda world: facts)
+    bench._seed, bench._source = 0, SimpleNamespace(draw=lambda *_: request)  # pyright: ignore
+    monkeypatch.setattr(bench, "_start", lambda *_: (SimpleNamespace(), ""))
+    monkeypatch.setattr(bench, "_symbolic", lambda *_: rung)
+    monkeypatch.setattr(bench, "_rung", lambda *_: rung)
+    assert bench.run("pour", 0)["prepared"]
+    holds[0] = False
+    row = bench.run("pour", 0)
+    assert "prepared" not in row and row["detail"].startswith("(filled glass_0 water) does not last")
 
 
 def test_what_must_hold_first_is_part_of_a_request(source):

@@ -96,7 +96,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 reason, detail = _lacking(found), f"{found} {predicate}({name}, {where}) would be true"
                 if found != _NO_STANCE and not righted:
                     righted = True
-                    if (yield from _set_upright(world, where)):
+                    if (yield from set_upright(world, where)):
                         continue
                 if found == _NO_WAY and not turned_over and (yield from regrasp(world, name, hand)):
                     turned_over = True
@@ -205,7 +205,7 @@ def _find(
     return found, ()
 
 
-def _set_upright(world: PlannedWorld, where: str) -> Generator[Program, str, bool]:
+def set_upright(world: PlannedWorld, where: str) -> Generator[Program, str, bool]:
     """Puts a container that has fallen over onto open floor as it stands; returns whether it did."""
     if world.domain.fixed(where) or where in world.held or all(world.held) or not is_tipped(world, where):
         return False

@@ -22,6 +22,7 @@ from ig2mj.planning.holding import Hold, hold_at
 from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_with, quaternion, travel, vector3
 from ig2mj.planning.openings import free_points, opening_of
 from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.placing import set_upright
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.supplies import contents, litres, required_litres
 from ig2mj.planning.world import PlannedWorld, Rotation, Vector
@@ -65,7 +66,7 @@ def pour(world: PlannedWorld, step: Step) -> Primitive:
     if reason := next(filter(None, map(world.domain.impossible, step.adds)), ""):
         return Outcome("not_true_after", reason)
     hand_with(world, name)
-    failed = set[int]()
+    failed, righted = set[int](), False
     reason, detail = "not_true_after", f"{target} has no place that lies open above"
     for attempt in range(PLACES):
         if _holds(world, step):
@@ -77,7 +78,10 @@ def pour(world: PlannedWorld, step: Step) -> Primitive:
         hand = hand_with(world, name)
         left = lambda hand=hand: [h for h in _above(world, name, target, hand) if h.number not in failed]  # noqa: E731
         if not left():
-            break
+            if righted or not (yield from set_upright(world, target)):
+                break
+            righted = True
+            continue
         reason, way, number = yield from hold_at(world, name, hand, left)
         if name not in world.held:
             continue

@@ -8,7 +8,7 @@ hold before (a closed door, dust, an object in a hand) is part of the request, s
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -17,13 +17,33 @@ from ig2mj.knowledge.taxonomy import is_a
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.steps import PRIMITIVES, SUBSTANCE, Step
 from ig2mj.sampling.conditions import Condition
+from ig2mj.scene.extras import attached_as_text
 from ig2mj.scene.substance_requests import substances_as_text
 
-KIT = ("rag/rag_00", "carving_knife/carving_knife_00", "apple/apple_00", "steak/steak_00")
-"""Of the object library, added to every home: most lack something that cleans, cuts, is cut or is cooked."""
+KIT = (
+    "rag/rag_00", "carving_knife/carving_knife_00", "apple/apple_00", "steak/steak_00", "atomizer/atomizer_00",
+    "light_bulb/light_bulb_00", "table_lamp/table_lamp_00",
+)  # fmt: skip
+"""Of the object library, added to every home: most lack something that cleans, cuts, is cut, is cooked or sprays, and
+two things of which one can be attached to the other."""
 
-ADDED = (*KIT, *substances_as_text([WATER]))
-"""What a home is loaded with: the objects of `KIT`, and water that containers can hold."""
+
+def added_to(own: Collection[str]) -> tuple[str, ...]:
+    """What a home is loaded with: the objects of `KIT`, of which the last but one can be attached to the last, and
+    water that containers can hold.
+
+    Args:
+      own: names of the home's own objects.
+    """
+    bulb, lamp = (_next_of(added.partition("/")[0], own) for added in KIT[-2:])
+    return (*KIT, attached_as_text(bulb, lamp), *substances_as_text([WATER]))
+
+
+def _next_of(category: str, own: Collection[str]) -> str:
+    """The name of the first object of a category that is added to a home."""
+    numbers = [n.removeprefix(f"{category}_") for n in own if n.startswith(f"{category}_")]
+    return f"{category}_{1 + max((int(n) for n in numbers if n.isdecimal()), default=-1)}"
+
 
 MEASURED = tuple(PRIMITIVES)
 """Primitives that requests are drawn for."""
@@ -51,7 +71,8 @@ class RequestSource:
 
     def __init__(self, domain: Domain, kit: Sequence[str]):
         """`kit`: names of the added objects, in the order of `KIT`; they stand outside the house."""
-        self._domain, (self._rag, self._knife, self._fruit, self._meat) = domain, kit
+        self._domain, self._kit = domain, tuple(kit)
+        self._rag, self._knife, self._fruit, self._meat, self._spray, self._bulb, self._lamp = kit
         tables = domain.model.tables
         names, categories = tables.object_names, tables.object_categories
         inside = [n for n, c in zip(names, categories, strict=True) if c not in ("walls", "floors", "ceilings")]
@@ -64,6 +85,7 @@ class RequestSource:
         self._furniture = furniture
         self._containers = [n for n in furniture if domain.opens(n)]
         self._containers += [n for n in self._things if is_a(category[n], _CONTAINER)]
+        self._open_above = [n for n in self._things if category[n] not in _STRUCTURE]
         self._rooms = list(tables.room_names) or [n for n, c in category.items() if c == "floors"]
 
     def draw(self, primitive: str, rng: np.random.Generator) -> Request | None:
@@ -72,11 +94,13 @@ class RequestSource:
         if arguments is None or len(set(arguments)) < len(arguments):
             return None
         before, taken = self._before(primitive, arguments)
-        kit = [n for n in (*arguments, *taken) if n in (self._rag, self._knife, self._fruit, self._meat)]
+        kit = [n for n in (*arguments, *taken) if n in self._kit]
         placed = {c.arguments[0] for c in before if c.is_placement}
         for name in dict.fromkeys(kit):
             if name not in placed:
-                before.insert(0, Condition("on_top", (name, _one(self._domain.supports, rng))))
+                before.insert(
+                    0, Condition("on_top", (name, _one([s for s in self._domain.supports if s not in self._kit], rng)))
+                )
         return Request(Step(primitive, arguments), tuple(before), taken)
 
     def _arguments(self, primitive: str, rng: np.random.Generator) -> tuple[str, ...] | None:
@@ -89,7 +113,7 @@ class RequestSource:
             "soak": [n for n in self._loose if domain.has(n, "soakable")] + [self._rag],
             "fill": [n for n in self._loose if n in domain.fillable],
             "pour": [n for n in self._loose if n in domain.pourable],
-            "attach": [n for n in self._loose if domain.attachable(n)],
+            "attach": [n for n in (*self._loose, self._bulb) if domain.attachable(n)],
             "mix": [n for n in self._things if domain.contains(n) and domain.mixable],
             "slice": [n for n in self._loose if domain.has(n, "sliceable")] + [self._fruit],
             "cook": [n for n in self._loose if domain.has(n, "cookable")] + [self._meat],
@@ -109,7 +133,7 @@ class RequestSource:
             "slice": [self._knife],
             "soak": domain.taps,
             "fill": domain.taps,
-            "pour": self._things,
+            "pour": self._open_above,
             "spray": domain.sprays,
             "mix": domain.stirrers,
             "attach": domain.attachable(name) if name else (),

@@ -1,8 +1,9 @@
 """Carries out drawn requests to primitives (`ig2mj.planning.requests`) in one home, each from the home's start.
 
-A request is *prepared* if what must hold first could be sampled and taken into the hands. It *has a solution* if the
-symbolic rung carries it out from the same state (the sampler finds a state in which the primitive's condition holds),
-or the rung that is measured does.
+A request is *prepared* if what must hold first could be sampled and taken into the hands, and states among it still
+hold then: water does not stay in a glass that lies on its side. It *has a solution* if the symbolic rung carries it out
+from the same state (the sampler finds a state in which the primitive's condition holds), or the rung that is measured
+does.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from ig2mj.planning.kinematic import SETTLE, KinematicRung
 from ig2mj.planning.kinematic_stage import KinematicStage
 from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.physics import PhysicsRung
-from ig2mj.planning.requests import ADDED, MEASURED, Request, RequestSource
+from ig2mj.planning.requests import MEASURED, Request, RequestSource, added_to
 from ig2mj.planning.rung import Rung
 from ig2mj.planning.starts import open_doors, start_place
 from ig2mj.planning.steps import Outcome, PlanningError, Step
@@ -102,7 +103,7 @@ def _bench(home: str, rung: str, robot: str, seed: int) -> RequestBench:
 
 
 class RequestBench:
-    """A home with what `ADDED` names and a robot, in which requests are carried out one after another.
+    """A home with what `added_to` names and a robot, in which requests are carried out one after another.
 
     Attributes:
       home: its name.
@@ -116,12 +117,13 @@ class RequestBench:
         if rung not in RUNGS:
             raise PlanningError(f"requests cannot be measured on the {rung} rung ({', '.join(RUNGS)} can)")
         self.home, self._seed = home, seed
-        bare = load_scene(home, objects=ADDED)
+        own = set(load_scene(home).object_names)
+        added = added_to(own)
+        bare = load_scene(home, objects=added)
         self._sampler = make_sampler(bare)
         self._own_start = self._sampler.start
         body: Any = make_robot(robot)
         self._domain = Domain.of_robot(self._sampler.model, body)
-        own = set(load_scene(home).object_names)
         wholes = np.flatnonzero(bare.tables.object_part_of < 0)
         kit = [name for o in wholes if (name := bare.tables.object_names[o]) not in own]
         self._source = RequestSource(self._domain, kit)
@@ -129,7 +131,7 @@ class RequestBench:
         if rung == "symbolic":
             return
         x, y = start_place(bare, self._sampler.query.view, ())
-        scene = load_scene(home, agents=[body.at(x, y, 0.0)], objects=ADDED)
+        scene = load_scene(home, agents=[body.at(x, y, 0.0)], objects=added)
         self._query, self._planner = SceneQuery(scene), MotionPlanner(scene)
         if rung == "physics":
             self._simulation = Simulation(scene, seed=seed, grasping="assisted")
@@ -156,6 +158,8 @@ class RequestBench:
             taken = _outcome(rung, Step("grasp", (name,)))
             if not taken.done:
                 return {**found, "detail": f"grasp {name}: {taken.reason}: {taken.detail}"}
+        if lost := next((c for c in request.before if not c.is_placement and not _true(rung.facts(0), c)), None):
+            return {**found, "detail": f"{lost} does not last until the primitive begins"}
         began = time.process_time()
         outcome = _outcome(rung, request.step)
         return {
@@ -229,6 +233,10 @@ class RequestBench:
             if not outcome.done:
                 return outcome
         return Outcome()
+
+
+def _true(facts: Facts, condition: Condition) -> bool:
+    return facts.holds(condition.predicate, *condition.arguments) == condition.value
 
 
 def _outcome(rung: Rung, step: Step) -> Outcome:
