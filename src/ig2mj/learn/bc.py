@@ -177,6 +177,7 @@ def _clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any]) ->
             checkpoints.save(updates // CALL, {"learner": learner}, meta)
             saved = time.monotonic()
         if over:
+            log.close()
             return learner, row
 
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-from ig2mj.learn.event_file import EventFile
+from ig2mj.learn.curves import Curves
 
 LOSSES = 3
 """So many losses stand in a line of the terminal, before an episode has ended."""
@@ -34,7 +34,7 @@ class Log:
         self._quiet, self._board, self._minutes = quiet, None, minutes
         if self._folder is not None:
             self._folder.mkdir(parents=True, exist_ok=True)
-            self._board = EventFile(self._folder)
+            self._board = Curves(self._folder)
 
     def forget_after(self, seconds: float) -> None:
         """Drops the rows after a checkpoint, which a resumed run writes again."""
@@ -56,6 +56,11 @@ class Log:
             self._board.add(int(values["env_steps"] or 0), points)
         if not self._quiet:
             print(_line(values, self._minutes), file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """Ends TensorBoard's file."""
+        if self._board is not None:
+            self._board.close()
 
     @property
     def _file(self) -> pathlib.Path | None:

@@ -245,6 +245,7 @@ class _Training:
                     kept(self.learner, {"seconds": self.clock, "env_steps": self.env_steps, "counted": counted, **row})
                 team.barrier(f"saved {self.iteration}")
             if stopped:
+                self.log.close()
                 return Result(self.learner, row, self.iteration, compile_s, stopped)
         raise AssertionError
 
