@@ -108,7 +108,9 @@ def test_pages_offer_it_and_requests_and_ground_steps_have_it():
     assert "Fill apple_0" not in offers(known, "sink_0", ("apple_0",))
     problem = problem_of("small_home", "(filled bowl_0 water)")
     assert Step("fill", ("bowl_0", "sink_0")) in set(ground_steps(domain_of(problem, "humanoid"), problem))
-    source = RequestSource(known, (*known.tools[:1], *known.knives[:1], "apple_0", "fish_0", "spray", "bulb", "lamp"))
+    source = RequestSource(
+        known, (*known.tools[:1], *known.knives[:1], "apple_0", "fish_0", "spray", "spoon", "bulb", "lamp")
+    )
     drawn = [source.draw("fill", np.random.default_rng(seed)) for seed in range(20)]
     taken = {request.step.arguments[0] for request in drawn if request is not None}
     assert taken and taken <= set(known.fillable)

@@ -154,7 +154,9 @@ def test_pages_requests_functions_and_ground_steps_have_it():
     (schema,) = [t for t in tools(found.scene.tables, ["water"]) if t["function"]["name"] == "pour"]
     properties = schema["function"]["parameters"]["properties"]
     assert properties["substance"]["enum"] == ["water"] and "mug_0" in properties["target"]["enum"]
-    source = RequestSource(known, (*known.tools[:1], *known.knives[:1], "apple_0", "fish_0", "spray", "bulb", "lamp"))
+    source = RequestSource(
+        known, (*known.tools[:1], *known.knives[:1], "apple_0", "fish_0", "spray", "spoon", "bulb", "lamp")
+    )
     drawn = [source.draw("pour", np.random.default_rng(seed)) for seed in range(20)]
     assert {request.step.arguments[0] for request in drawn if request is not None} <= set(known.pourable)
 

@@ -22,7 +22,9 @@ from ig2mj.states.model import StateModel
 @pytest.fixture(scope="module")
 def source(tiny_home):
     domain = Domain(StateModel.of_manifest(tiny_home.tables, tiny_home.manifest))
-    return RequestSource(domain, (*domain.tools[:1], *domain.knives[:1], "apple", "apple", "spray", "bulb", "lamp"))
+    return RequestSource(
+        domain, (*domain.tools[:1], *domain.knives[:1], "apple", "apple", "spray", "spoon", "bulb", "lamp")
+    )
 
 
 def drawn(source, primitive, count=30):
@@ -60,6 +62,15 @@ def test_every_home_has_something_to_spray_with_and_something_to_attach(kitted):
         bulb, lamp = request.step.arguments
         placed = {c.arguments[0] for c in request.before if c.is_placement}
         assert request.taken == (bulb,) and placed == {bulb, lamp}
+
+
+def test_every_home_has_a_spoon_and_what_is_stirred(kitted):
+    found = drawn(kitted, "mix")
+    assert len(found) == 30 and len({r.step.object for r in found}) > 1
+    for request in found:
+        container, spoon, substance = request.step.arguments
+        assert substance == "seawater" and request.taken == (spoon,)
+        assert {Condition("contains", (container, part)) for part in ("salt", WATER)} <= set(request.before)
 
 
 def test_water_is_poured_onto_what_has_an_upper_side(kitted):

@@ -22,21 +22,25 @@ from ig2mj.scene.substance_requests import substances_as_text
 
 KIT = (
     "rag/rag_00", "carving_knife/carving_knife_00", "apple/apple_00", "steak/steak_00", "atomizer/atomizer_00",
-    "light_bulb/light_bulb_00", "table_lamp/table_lamp_00",
+    "spoon/spoon_00", "light_bulb/light_bulb_00", "table_lamp/table_lamp_00",
 )  # fmt: skip
-"""Of the object library, added to every home: most lack something that cleans, cuts, is cut, is cooked or sprays, and
-two things of which one can be attached to the other."""
+"""Of the object library, added to every home: most lack something that cleans, cuts, is cut, is cooked, sprays or
+stirs, and two things of which one can be attached to the other."""
+
+
+STIRRED = ("salt", "seawater")
+"""Substances: what water is stirred with, and what it becomes."""
 
 
 def added_to(own: Collection[str]) -> tuple[str, ...]:
-    """What a home is loaded with: the objects of `KIT`, of which the last but one can be attached to the last, and
-    water that containers can hold.
+    """What a home is loaded with: the objects of `KIT`, of which the last but one can be attached to the last, water
+    that containers can hold, and what is stirred.
 
     Args:
       own: names of the home's own objects.
     """
     bulb, lamp = (_next_of(added.partition("/")[0], own) for added in KIT[-2:])
-    return (*KIT, attached_as_text(bulb, lamp), *substances_as_text([WATER]))
+    return (*KIT, attached_as_text(bulb, lamp), *substances_as_text([WATER, *STIRRED]))
 
 
 def _next_of(category: str, own: Collection[str]) -> str:
@@ -72,7 +76,7 @@ class RequestSource:
     def __init__(self, domain: Domain, kit: Sequence[str]):
         """`kit`: names of the added objects, in the order of `KIT`; they stand outside the house."""
         self._domain, self._kit = domain, tuple(kit)
-        self._rag, self._knife, self._fruit, self._meat, self._spray, self._bulb, self._lamp = kit
+        self._rag, self._knife, self._fruit, self._meat, self._spray, self._spoon, self._bulb, self._lamp = kit
         tables = domain.model.tables
         names, categories = tables.object_names, tables.object_categories
         inside = [n for n, c in zip(names, categories, strict=True) if c not in ("walls", "floors", "ceilings")]
@@ -114,7 +118,7 @@ class RequestSource:
             "fill": [n for n in self._loose if n in domain.fillable],
             "pour": [n for n in self._loose if n in domain.pourable],
             "attach": [n for n in (*self._loose, self._bulb) if domain.attachable(n)],
-            "mix": [n for n in self._things if domain.contains(n) and domain.mixable],
+            "mix": [n for n in self._loose if domain.contains(n)],
             "slice": [n for n in self._loose if domain.has(n, "sliceable")] + [self._fruit],
             "cook": [n for n in self._loose if domain.has(n, "cookable")] + [self._meat],
             "freeze": [n for n in self._loose if domain.has(n, "freezable")] + [self._fruit],
@@ -135,7 +139,7 @@ class RequestSource:
             "fill": domain.taps,
             "pour": self._open_above,
             "spray": domain.sprays,
-            "mix": domain.stirrers,
+            "mix": [self._spoon],
             "attach": domain.attachable(name) if name else (),
         }
         if primitive in ("cook", "freeze"):

@@ -129,13 +129,13 @@ _PRIMITIVES = (
         one_of=(("covered", "?0", "?2"), ("saturated", "?0", "?2")),
     ),
     Primitive(
+        "attach", ("object", "other"), "the object is in a hand", "attached(object, other); the hand lets go of it",
+        (("attached", "?0", "?1"),),
+    ),
+    Primitive(
         "mix", ("object", "tool", "substance"),
         "the tool, which stirs, is in a hand; the object contains what a recipe of the substance takes",
         "contains(object, substance)", (("contains", "?0", "?2"),),
-    ),
-    Primitive(
-        "attach", ("object", "other"), "the object is in a hand", "attached(object, other); the hand lets go of it",
-        (("attached", "?0", "?1"),),
     ),
 )  # fmt: skip
 
