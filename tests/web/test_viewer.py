@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import http.client
+import queue
 import random
 import time
 
@@ -137,8 +138,9 @@ def test_who_vanishes_while_dragging_lets_go(viewer):
     while viewer.runner.drags and time.monotonic() < end:
         viewer._stopped.wait(0.02)
     assert not viewer.runner.drags
-    data = viewer.runner.source.mujoco(0)[1]
-    assert not np.any(data.xfrc_applied)
+    forces = queue.Queue()  # filled by the thread that steps: a state is stale for others as soon as it steps
+    viewer.runner._commands.put(lambda: forces.put(viewer.runner.source.mujoco(0)[1].xfrc_applied.copy()))
+    assert not np.any(forces.get(timeout=10))
 
 
 def test_physics_does_not_wait_for_a_page_that_takes_nothing(viewer):
