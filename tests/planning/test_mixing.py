@@ -22,8 +22,9 @@ TOGETHER = (*SPOON, "substances:salt@bowl_0,water@bowl_0,seawater")
 GOAL = "(contains bowl_0 seawater)"
 
 
-def test_ingredients_are_poured_together_and_stirred():
-    steps = planned(GOAL, APART)
+@pytest.mark.parametrize("goal", [GOAL, "(filled bowl_0 seawater)"])
+def test_ingredients_are_poured_together_and_stirred(goal):
+    steps = planned(goal, APART)
     assert {"pour mug_0 bowl_0 salt", "pour carafe_0 bowl_0 water"} < set(steps)
     assert steps[-2:] == ["grasp spoon_0", "mix bowl_0 spoon_0 seawater"]
 

@@ -40,7 +40,10 @@ class Curves:
     def _writer(self) -> Any:
         try:
             from tensorboardX import SummaryWriter
+
+            return SummaryWriter(str(self._folder), flush_secs=10)
         except ModuleNotFoundError:
             print("no TensorBoard file: the package tensorboardX is not installed", file=sys.stderr)
-            return None
-        return SummaryWriter(str(self._folder), flush_secs=10)
+        except Exception as e:  # in a thread nobody else would say it; the run and `progress.csv` go on
+            print(f"no TensorBoard file: {e}", file=sys.stderr)
+        return None

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from ig2mj.geometry.host_rotations import about_vertical
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.grasping import grasp
+from ig2mj.planning.grasping import held_again
 from ig2mj.planning.holding import Hold, hold_at
 from ig2mj.planning.moves import (
     OPENS,
@@ -51,7 +51,7 @@ def attach(world: PlannedWorld, step: Step) -> Primitive:
     for attempt in range(TRIES):
         if world.facts.holds("attached", name, other) and name not in world.held:
             return Outcome(attempts=max(attempt, 1))
-        if name not in world.held and not (yield from grasp(world, Step("grasp", (name,)))).done:
+        if not (yield from held_again(world, name)):
             return Outcome("slipped", f"the hand lost {name}", attempts=max(attempt, 1))
         hand = hand_with(world, name)
         left = lambda hand=hand: [h for h in _ways(world, name, other, hand) if h.number not in failed]  # noqa: E731

@@ -7,7 +7,7 @@ from collections.abc import Generator
 import numpy as np
 
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
-from ig2mj.planning.grasping import grasp, put_down_others
+from ig2mj.planning.grasping import held_again, put_down_others
 from ig2mj.planning.holding import Hold, hold_at
 from ig2mj.planning.moves import DOWN, UP, Primitive, Program, ahead, carry, hand_with, quaternion, travel, vector3
 from ig2mj.planning.openings import opening_of
@@ -50,7 +50,7 @@ def mix(world: PlannedWorld, step: Step) -> Primitive:
             return Outcome(attempts=max(attempt, 1))
         if lacking := ingredients(world.facts, name, substance):
             return Outcome("not_true_after", f"{name} lacks {lacking} for {substance}", attempts=max(attempt, 1))
-        if tool not in world.held and not (yield from grasp(world, Step("grasp", (tool,)))).done:
+        if not (yield from held_again(world, tool)):
             return Outcome("slipped", f"the hand lost {tool}", attempts=max(attempt, 1))
         yield from put_down_others(world, tool)
         if opening_of(world, name).normal[2] < UPWARDS:

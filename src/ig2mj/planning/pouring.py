@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from ig2mj.geometry.host_rotations import about_vertical, matrix_to_quat, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.grasping import grasp
+from ig2mj.planning.grasping import held_again
 from ig2mj.planning.holding import Hold, hold_at
 from ig2mj.planning.moves import UP, Primitive, Program, ahead, carry, hand_with, quaternion, travel, vector3
 from ig2mj.planning.openings import free_points, opening_of
@@ -73,7 +73,7 @@ def pour(world: PlannedWorld, step: Step) -> Primitive:
             return Outcome(attempts=max(attempt, 1))
         if litres(world.facts, name, substance) < CONTAINS:
             return Outcome("not_true_after", f"{name} contains no {substance}", attempts=max(attempt, 1))
-        if name not in world.held and not (yield from grasp(world, Step("grasp", (name,)))).done:
+        if not (yield from held_again(world, name)):
             return Outcome("slipped", f"the hand lost {name}", attempts=max(attempt, 1))
         hand = hand_with(world, name)
         left = lambda hand=hand: [h for h in _above(world, name, target, hand) if h.number not in failed]  # noqa: E731

@@ -8,7 +8,7 @@ import numpy as np
 
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.grasping import grasp, put_down_others
+from ig2mj.planning.grasping import held_again, put_down_others
 from ig2mj.planning.holding import Hold, hold_at, wait_until
 from ig2mj.planning.moves import UP, Primitive, ahead, carry, hand_with, travel
 from ig2mj.planning.openings import Surfaces, opening_of, surfaces
@@ -49,7 +49,7 @@ def spray(world: PlannedWorld, step: Step) -> Primitive:
             return Outcome(attempts=max(attempt, 1))
         if litres(world.facts, tool, substance) < CONTAINS:
             return Outcome("not_true_after", f"{tool} contains no {substance}", attempts=max(attempt, 1))
-        if tool not in world.held and not (yield from grasp(world, Step("grasp", (tool,)))).done:
+        if not (yield from held_again(world, tool)):
             return Outcome("slipped", f"the hand lost {tool}", attempts=max(attempt, 1))
         yield from put_down_others(world, tool)
         hand, now = hand_with(world, tool), _Aims(world, name, tool, hand_with(world, tool))

@@ -16,7 +16,7 @@ from ig2mj.planning.domain import SYMMETRIC, HeatSource
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.step_order import LATER, ordered
 from ig2mj.planning.steps import PLACE, Step
-from ig2mj.planning.supplies import RECEIVED, Supply, supplies
+from ig2mj.planning.supplies import RECEIVED, Supply, part_in, supplies
 from ig2mj.sampling.conditions import Condition
 
 SUPPLIES = ("fill", "soak", "pour", "spray", "mix")
@@ -254,7 +254,7 @@ class StepBuilder:
         if chosen.tap:
             self._hold_below_tap("fill", chosen.source)
         for part in chosen.inputs:
-            self._supply(Condition(c.predicate, (name, part)))
+            self._supply(part_in(name, part))
         self._reach(name)
         self._set_down(name)
         self._take(chosen.source)

@@ -143,12 +143,13 @@ def _mixtures(
     found = list[Supply]()
     for recipe in facts.domain.recipes(substance):
         missing = missing_parts(facts, name, recipe)
-        if all(i not in within and supplies(facts, _part(name, i), required, within) for i in missing):
+        if all(i not in within and supplies(facts, part_in(name, i), required, within) for i in missing):
             found += [Supply("mix", s, inputs=tuple(missing)) for s in facts.domain.stirrers if s != name]
     return found
 
 
-def _part(name: str, substance: str) -> Condition:
+def part_in(name: str, substance: str) -> Condition:
+    """What must hold of a container before it is stirred; what is poured into it fills a fifth of it in any case."""
     return Condition("contains", (name, substance))
 
 

@@ -190,7 +190,9 @@ class BatchCamera:
             from ig2mj.sensors.ray_caster import use_merged
 
             robots = robot_geoms(self._host, self.engine.scene.tables.body_agent)
-            use_merged(contexts, self._host, self._merged, self.engine.num_worlds, robots, self._changes)
+            use_merged(
+                contexts, self._host, self._merged, self.engine.num_worlds, robots, len(self.cameras), self._changes
+            )
         elif not pins.obstacles():
             from ig2mj.sensors.shading import limit_light
 

@@ -44,6 +44,7 @@ def use_merged(
     tables: Tables,
     nworld: int,
     robots: Bool[np.ndarray, "G"],
+    pictures: int,
     changes: Sequence[tuple[str, str]] = (),
 ) -> None:
     """Lets render contexts cast rays against merged meshes.
@@ -52,7 +53,9 @@ def use_merged(
       contexts: of MuJoCo Warp, of cameras of the render model, made with `tables.absorbed` in no group that is seen.
       robots: geoms that move through the home together. The tree of boxes keeps the shape that it has when it is made,
         so that they have a branch of their own. Their surfaces are not there when seen from behind or from nearer than
-        `NEAR`, as in OpenGL: a camera that is drawn a little further back than the robot's sees through its head.
+        `NEAR` in pictures, as in OpenGL: a camera that is drawn a little further back than the robot's sees through its
+        head.
+      pictures: cameras that make pictures, the first ones; the others' rays meet every surface of robots.
       changes: of the kernel (`limit_light`).
     """
     assert host.nflex == 0, "flexes' arrays carry the tables"
@@ -88,7 +91,15 @@ def use_merged(
             context.flex_geom_edgeid = wp.array(rows.astype(np.int32), dtype=int)
             context.geom_ray_types = tuple(sorted({*context.geom_ray_types, MESH}))
             bvh.build_scene_bvh(as_merged, data, context, nworld)
-            limit_light(context, host.nlight, make_cast_ray, changes)
+            limit_light(context, host.nlight, make_cast_ray, [*changes, _marked(pictures)])
+
+
+_FAR = '      max_cam_dist,\n      wp.static(rc_static["enable_backface_culling"]),\n'
+
+
+def _marked(pictures: int) -> tuple[str, str]:
+    """The change of the kernel by which rays of other cameras than those of pictures have a negative reach."""
+    return _FAR, _FAR.replace("max_cam_dist", f"wp.where(camid < {pictures}, max_cam_dist, -max_cam_dist)")
 
 
 @no_type_check
@@ -98,7 +109,8 @@ def _cast_ray(
     """The function for the kinds of geoms that have boxes. With `first_hit` any hit nearer than `max_dist` will do.
     `robots`: there are some.
 
-    Upstream's arguments are kept; two arrays of flexes, of which there are none, hold the tables of merged meshes.
+    Upstream's arguments are kept; two arrays of flexes, of which there are none, hold the tables of merged meshes, and
+    `max_dist` is negative for rays that are of no picture (`_marked`).
     """
 
     still, garden = known.still, known.garden
@@ -141,7 +153,8 @@ def _cast_ray(
         max_dist: float,
         cull_backfaces: bool,
     ) -> tuple[int, float, wp.vec3, float, float, int, int]:
-        dist = max_dist
+        dist = wp.abs(max_dist)
+        pictured = max_dist > 0.0
         normal = wp.vec3(0.0, 0.0, 0.0)
         geom_id = int(-1)
         bary_u = float(0.0)
@@ -180,8 +193,8 @@ def _cast_ray(
             merged = int(-1)
             behind = cull_backfaces
             skipped = float(0.0)
-            if wp.static(robots):
-                if tables[wp.static(of_robots) + geom] != 0:
+            if wp.static(robots and not first_hit):
+                if pictured and tables[wp.static(of_robots) + geom] != 0:
                     behind = True
                     skipped = wp.static(NEAR)
             start = origin + skipped * direction
