@@ -102,6 +102,37 @@ def test_what_failed_in_the_present_world_comes_after_the_rest(sampler, start):
     assert again.steps[0].serves != first and again.steps[-1].serves == first, again.steps
 
 
+def test_what_lies_on_an_object_goes_along_on_the_symbolic_rung(sampler, start):
+    loaded = started(sampler, start, "(on_top knife book)")
+    planner = planner_of(sampler.model, "(on_top book stove)")
+    rung = SymbolicRung(planner.domain, sampler, [loaded])
+    before = rung.facts(0)
+    assert before.holds("on_top", "knife", "book")
+    (result,) = solve(planner, rung)
+    after = rung.facts(0)
+    assert result.success and after.holds("on_top", "knife", "book")
+    moved = [after.place(name) - before.place(name) for name in ("knife", "book")]
+    assert np.linalg.norm(moved[1]) > 0.2 and abs(moved[0][2] - moved[1][2]) < 0.01
+
+
+def test_a_support_on_which_something_did_not_stay_is_laid_flat_if_it_is_not(sampler, start):
+    planner = planner_of(sampler.model, "(on_top knife book)")
+    failed = {"place_on_top knife book": 1}
+    lying = SymbolicRung(planner.domain, sampler, [start])
+    assert not any(step.flat for step in planner.plan(lying.facts(0), failed_steps=failed).steps)
+    sampler.query.load(start[0])
+    index = planner.domain.index("book")
+    pos = np.asarray(sampler.query.view.object_pos)[0, index] + [0.0, 0.0, 0.041]
+    sampler.query.place(index, pos, np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0]))
+    assert sampler.query.settle()
+    standing = SymbolicRung(planner.domain, sampler, [(sampler.query.save(), start[1])])
+    assert not any(step.flat for step in planner.plan(standing.facts(0)).steps)
+    steps = planner.plan(standing.facts(0), failed_steps=failed).steps
+    (flat,) = [k for k, step in enumerate(steps) if step.flat]
+    assert steps[flat].object == "book" and str(steps[flat + 1]) == "grasp knife"
+    assert solve(planner, standing)[0].success
+
+
 @pytest.mark.slow
 def test_halves_are_moved_after_a_cut(sampler, start):
     cut = started(sampler, start, "(sliced apple)")

@@ -104,6 +104,10 @@ class Domain:
         """Metres from corner to corner of an object's box as it is modelled."""
         return float(np.linalg.norm(self.model.tables.object_bbox[self.index(name)]))
 
+    def thickness(self, name: str) -> float:
+        """Metres of the shortest edge of an object's box as it is modelled: its height where it lies flat."""
+        return float(np.min(self.model.tables.object_bbox[self.index(name)]))
+
     def opens(self, name: str) -> bool:
         """Whether an object has joints that count for `open`."""
         return name in self._openable

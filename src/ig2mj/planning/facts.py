@@ -99,6 +99,21 @@ class Facts:
         truth = self.truth(near)
         return tuple(a.arguments[0] for a in near if truth[a])
 
+    def borne(self, name: str) -> tuple[Atom, ...]:
+        """What says of loose objects that they are in or on an object, or in or on these, but for what hands hold."""
+        found: dict[str, Atom] = {}
+        bearers = [name]
+        for bearer in bearers:
+            (low, high), near = self.box(bearer), list[Atom]()
+            for other in self.domain.loose:
+                middle = self.place(other)
+                above = (low <= middle).all() and (middle[:2] <= high[:2]).all()
+                if above and other not in (name, bearer, *found, *self.held):
+                    near += [Atom(predicate, (other, bearer)) for predicate in ("inside", "on_top")]
+            found |= {a.arguments[0]: a for a, holds in reversed(self.truth(near).items()) if holds}
+            bearers += [other for other in found if other not in bearers]
+        return tuple(found.values())
+
     def room(self, name: str) -> str:
         """Room instance above whose floor an object is; the home's floor object where the map has none there."""
         tables = self.domain.model.tables

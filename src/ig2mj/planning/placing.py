@@ -184,7 +184,7 @@ def _find(
     name, where = step.arguments
     while True:
         for also in dict.fromkeys((step.also, ())):
-            spots = _Remembered(spots_for(world, predicate, name, where, also))
+            spots = _Remembered(spots_for(world, predicate, name, where, also, flat=step.flat))
             found = _plan(world, predicate, name, hand, spots)
             if not isinstance(found, str):
                 return found, also

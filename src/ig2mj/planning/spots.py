@@ -53,6 +53,9 @@ UPON = ((0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.0, 0.05), (0.0, -0.05))
 STANDS = 0.8
 """Cosine of the angle of an object's own vertical up to which it stands upright."""
 
+LOWER = 1.1
+"""Height of an orientation, as a share of the lowest one's, up to which the object lies flat."""
+
 LONGER = 1.3
 """Times that something is longer than it is wide, from which on it is put with an end first into what is narrow."""
 
@@ -80,6 +83,7 @@ def spots_for(
     where: str,
     also: Sequence[Condition] = (),
     hanging: Rotation | None = None,
+    flat: bool = False,
 ) -> Iterator[Spot]:
     """Poses of an object's main body that make a placement true. Orientations in which it rests come first, those
     nearest to how it is held before others, each turned about the vertical.
@@ -88,6 +92,7 @@ def spots_for(
       also: further placements that are to be true there.
       hanging: at these places the object keeps the orientation in which it hangs from the hand, after this rotation
         and turned about the vertical, with its lowest point where it would stand: it falls over when it is let go.
+      flat: of the orientations at rest just those in which it is lowest.
     """
     world.query.load(world.stage.snapshot(world.world))
     index = world.index(name)
@@ -98,10 +103,10 @@ def spots_for(
     middle = _middle_of_fixed_part(world, where) if predicate == "inside" else None
     around = world.obstacles([name], stays=False)
     wide = max(CORNER, WIDE * float(np.sort(np.ptp(world.vertices(name), axis=0))[1]) / 2)
-    turned = [(quat, angle) for quat in _upright(world, name) for angle in TURNS]
+    turned = [(quat, angle) for quat in _upright(world, name, flat) for angle in TURNS]
     if world.body.opening is not None:
         level = level_orientations(world, name) if predicate in ("inside", "under") else []
-        turned = [(quat, angle) for angle in ARM_TURNS for quat in (*level, *_upright(world, name))]
+        turned = [(quat, angle) for angle in ARM_TURNS for quat in (*level, *_upright(world, name, flat))]
     for quat, angle in turned:
         new = _yawed(quat, angle)
         for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
@@ -255,15 +260,18 @@ def is_tipped(world: PlannedWorld, name: str) -> bool:
     return float(matrices_on_host(world.pose(name)[1][None])[0][2, 2]) < STANDS
 
 
-def _upright(world: PlannedWorld, name: str) -> list[Float[np.ndarray, "4"]]:
+def _upright(world: PlannedWorld, name: str, flat: bool = False) -> list[Float[np.ndarray, "4"]]:
     """Orientations in which an object rests, each the nearest to its present one; that, where none is known. Of what
-    opens, those come first in which it stands, so that it can be filled."""
+    opens, those come first in which it stands, so that it can be filled. `flat`: just those in which it is lowest."""
     _, now = world.pose(name)
     frame, found = matrices_on_host(now[None])[0], []
     own = [matrices_on_host(np.array([e.quat], float))[0][2] for e in _orientations(world, name)]
     standing = [v for v in own if v[2] > STANDS]
     if world.domain.opens(name) and standing:
         own = standing
+    if flat and own:
+        heights = np.ptp(world.vertices(name) @ frame @ np.stack(own, 1), axis=0)
+        own = [vertical for vertical, height in zip(own, heights, strict=True) if height < LOWER * heights.min()]
     for vertical in own:
         up = frame @ vertical  # that of the orientation, now
         axis, angle = np.cross(up, UP), float(np.arccos(np.clip(up[2], -1.0, 1.0)))

@@ -22,6 +22,9 @@ from ig2mj.sampling.conditions import Condition
 SUPPLIES = ("fill", "soak", "pour", "spray", "mix")
 """Primitives that bring a substance into or onto an object."""
 
+FLAT = 1.2
+"""Height of an object's box, as a share of its thickness, up to which it lies flat."""
+
 CLEARED = 2
 """Failures of bringing a container out onto the floor after which it is left where it is."""
 
@@ -62,8 +65,8 @@ class StepBuilder:
             if condition.predicate == "toggled_on" and condition.arguments[0] in self._on:
                 self._switch(condition.arguments[0], condition.value)
 
-    def _add(self, primitive: str, *arguments: str, also: tuple[Condition, ...] = ()) -> None:
-        self.steps.append(Step(primitive, arguments, also, self._serves))
+    def _add(self, primitive: str, *arguments: str, also: tuple[Condition, ...] = (), flat: bool = False) -> None:
+        self.steps.append(Step(primitive, arguments, also, self._serves, flat))
 
     def _make(self, c: Condition) -> None:
         name = c.arguments[0]
@@ -219,8 +222,8 @@ class StepBuilder:
         self._take(container)
         self._put("place_on_floor", container, room)
 
-    def _put(self, primitive: str, name: str, where: str, also: tuple[Condition, ...] = ()) -> None:
-        self._add(primitive, name, where, also=also)
+    def _put(self, primitive: str, name: str, where: str, also: tuple[Condition, ...] = (), flat: bool = False) -> None:
+        self._add(primitive, name, where, also=also, flat=flat)
         if name in self._held:
             self._held.remove(name)
         if primitive == "place_inside":
@@ -371,6 +374,8 @@ class StepBuilder:
                 continue
             if rule.predicate == "inside" and self._failures(("place_inside", name, target)):
                 self._clear_out(target)
+            if rule.predicate == "on_top":
+                self._lay_flat(target, c)
             crowding = self._crowding(rule, c)
             if crowding is not None:
                 self._take(crowding.arguments[0])
@@ -385,14 +390,29 @@ class StepBuilder:
         """Conditions of the reading on where an object is, but for one."""
         return [w for w in self._required if w.value and w.predicate in PLACE and w.arguments[0] == name and w != c]
 
-    def _elsewhere(self, name: str, c: Condition) -> None:
+    def _elsewhere(self, name: str, c: Condition, flat: bool = False) -> None:
         """Places the partner of a relation in another spot where all else holds of it: there may be no room next to
         the present one."""
         own = sorted(self._placed_otherwise(name, c), key=lambda w: list(PLACE).index(w.predicate))
         target = own[0].arguments[1]
         self._reach(target)
         self._take(name)
-        self._put(PLACE[own[0].predicate], name, target, tuple(own[1:]))
+        self._put(PLACE[own[0].predicate], name, target, tuple(own[1:]), flat)
+
+    def _lay_flat(self, name: str, c: Condition) -> None:
+        """Lays what is to bear something on its flattest side, if it can be carried, does not lie so, and something
+        has not stayed on it: where it is to be, or on the nearest support."""
+        low, high = self._facts.box(name)
+        if not self._domain.graspable(name) or high[2] - low[2] < FLAT * self._domain.thickness(name):
+            return
+        own = any(s.primitive in PLACE.values() and s.arguments[0] == name for s in self.steps)
+        if own or not any(s.startswith("place_on_top ") and s.endswith(f" {name}") for s in self._failed_steps):
+            return
+        if self._placed_otherwise(name, c):
+            self._elsewhere(name, c, flat=True)
+        elif near := min(self._domain.supports, key=self._far_from(name), default=""):
+            self._take(name)
+            self._put("place_on_top", name, near, flat=True)
 
     def _crowding(self, rule: Condition, c: Condition) -> Condition | None:
         """After failures of a placement, one of the things that are there already: it is taken out first and put back

@@ -164,12 +164,14 @@ class Step:
       primitive: name of one of `PRIMITIVES`. arguments: names of objects and rooms.
       also: further conditions on the object that is placed, or that gets a substance, which must hold afterwards, too.
       serves: the condition of the goal that it is for; None: it was asked for by itself.
+      flat: a placement lays the object on its flattest side, since it is to bear something.
     """
 
     primitive: str
     arguments: tuple[str, ...]
     also: tuple[Condition, ...] = ()
     serves: Condition | None = None
+    flat: bool = False
 
     @property
     def object(self) -> str:

@@ -2,7 +2,7 @@
 
 It tests task plans and goals without motion: preconditions are checked, an object is placed where the sampler finds
 room and everything comes to rest, and hands are names of what they hold. A held object stays where it is until it is
-placed.
+placed; what is in and on it goes along then.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ig2mj.errors import AbilityError, StateError
 from ig2mj.planning.domain import Domain, condition_of
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.problem import start_of
-from ig2mj.planning.steps import Outcome, PlanningError, Step
+from ig2mj.planning.steps import PRIMITIVES, Outcome, PlanningError, Step
 from ig2mj.planning.supplies import ingredients, missing_parts
 from ig2mj.predicates.logic import Atom
 from ig2mj.sampling.budget import Budget
@@ -222,9 +222,15 @@ class SymbolicRung:
         rejected: Rejections = collections.Counter()
         self._sampler.start_from(own.physics, own.states)
         try:
-            around = self._around(step, self.facts(world), own.held)
+            facts = self.facts(world)
+            borne = facts.borne(step.object) if step.primitive in CARRIES else ()
+            around = [*self._around(step, facts, own.held), *map(condition_of, borne)]
+            carried = [atom.arguments[0] for atom in borne]
+            again = [step.object] if step.flat else ()
             required = list(step.adds if conditions is None else conditions)
-            row = self._sampler.sample(required, rng, Budget(WORK), rejected, around=around)
+            row = self._sampler.sample(
+                required, rng, Budget(WORK), rejected, around=around, carried=carried, again=again
+            )
         except (StateError, AbilityError) as e:
             return Outcome("not_true_after", str(e))
         if row is None:
@@ -244,6 +250,9 @@ class SymbolicRung:
             return Outcome("not_true_after", str(e))
         return None
 
+
+CARRIES = tuple(name for name in PRIMITIVES if name.startswith("place_"))
+"""Primitives by which an object comes elsewhere, with what is in and on it."""
 
 BRINGS: dict[str, Callable[[Step], str]] = {
     "pour": lambda step: step.arguments[0],

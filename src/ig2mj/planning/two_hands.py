@@ -373,7 +373,7 @@ def _place_for(world: PlannedWorld, predicate: str, step: Step) -> _Placing | st
     distance, lacking = floor.distances(here, NEAR_START), "there is no room for a place where"
     found: list[tuple[float, _Placing]] = []
     for also in dict.fromkeys((step.also, ())):
-        for spot in itertools.islice(spots_for(world, predicate, name, where, also), SPOTS):
+        for spot in itertools.islice(spots_for(world, predicate, name, where, also, flat=step.flat), SPOTS):
             target, _, rotation = grip_for(world, 0, name, spot)
             if rotation[2, 2] < TILTED:
                 continue

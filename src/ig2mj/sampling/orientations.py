@@ -24,15 +24,18 @@ class StableOrientations:
         self._query = query
         self._stable = [_quats_and_probabilities(entry.orientations) for entry in query.scene.manifest.objects]
 
-    def draw(self, object_index: int, rng: np.random.Generator, along: int, flat: bool) -> Float[np.ndarray, "4"]:
+    def draw(
+        self, object_index: int, rng: np.random.Generator, along: int, flat: bool, as_it_is: bool = False
+    ) -> Float[np.ndarray, "4"]:
         """A stable orientation, drawn by its probability and turned about the vertical.
 
         Args:
           along: index of an object whose sides the orientation is aligned with; -1: any angle.
           flat: take the stable orientation in which the object is lowest, instead of drawing one.
+          as_it_is: take the present orientation, instead of drawing one.
         """
         quats, prob = self._stable[object_index]
-        if quats is None:
+        if quats is None or as_it_is:
             quat = np.array(self._query.view.object_quat[0, object_index], float)
         elif flat:
             shapes = [self._query.footprint(object_index, q, np.zeros(2)) for q in quats]

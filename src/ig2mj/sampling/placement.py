@@ -20,6 +20,7 @@ from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
 from ig2mj.sampling.budget import Budget
 from ig2mj.sampling.bystanders import Bystanders
+from ig2mj.sampling.carried import Carried
 from ig2mj.sampling.columns import CELL, ColumnWindow
 from ig2mj.sampling.drop import Rest, origin, rest_at
 from ig2mj.sampling.footprint import Footprint
@@ -133,6 +134,7 @@ class _Task:
     """What is being placed, and how."""
 
     object_index: int
+    moves: Carried
     truth: Truth
     rng: np.random.Generator
     budget: Budget
@@ -162,6 +164,7 @@ class Placer:
         along: int = -1,
         flat: bool = False,
         pushable: Collection[int] = (),
+        carried: Sequence[int] = (),
     ) -> bool:
         """Puts an object into an area so that `truth` holds afterwards; leaves the world as it was where it cannot.
 
@@ -171,9 +174,11 @@ class Placer:
             cabinet that it all but fills; -1: all are turned by any angle.
           flat: of its stable orientations, the object takes one in which it is lowest, so that it can bear something.
           pushable: objects that may be moved, so long as `truth` holds.
+          carried: objects that go along, since they lie in or on the object, which is only turned about the vertical.
         """
         before = self.query.save()
-        task = _Task(object_index, truth, rng, budget, rejected, before, Bystanders(self.query, before), pushable)
+        moves, others = Carried.now(self.query, object_index, carried), Bystanders(self.query, before)
+        task = _Task(object_index, moves, truth, rng, budget, rejected, before, others, pushable)
         container = False
         for draw in range(DRAWS):
             if budget.spent():
@@ -181,9 +186,9 @@ class Placer:
                 break
             support = SUPPORT[min(draw * len(SUPPORT) // FIRST_DRAWS, len(SUPPORT) - 1)]
             aligned = along if draw % 2 else -1
-            quat = self._orientations.draw(object_index, rng, aligned, flat)
+            quat = self._orientations.draw(object_index, rng, aligned, flat, as_it_is=bool(carried))
             shift = rng.uniform(-CELL / 2, CELL / 2, 2)
-            if container and support == "loose" and draw // 2 % 2:
+            if container and support == "loose" and draw // 2 % 2 and not carried:
                 quat = tipped(quat, rng, np.asarray(self.query.view.object_quat[0, aligned]) if aligned >= 0 else None)
             shape = self.query.footprint(object_index, quat, shift)
             if draw == 0:
@@ -199,7 +204,7 @@ class Placer:
     def _try_area(self, task: _Task, quat: np.ndarray, shape: Footprint, area: PlacementArea, support: str) -> bool:
         if not task.budget.spend():
             return False
-        rest = self._candidates(task.object_index, task.rng, task.rejected, shape, area, support)
+        rest = self._candidates(task.moves.all, task.rng, task.rejected, shape, area, support)
         order = task.rng.permutation(len(rest.row))
         if support == "loose":  # deep down, it is more likely to stay
             spread = task.rng.uniform(0.0, LOOSE_SPREAD, len(order))
@@ -233,13 +238,13 @@ class Placer:
         """
         shape = self.query.footprint(object_index, quat, rng.uniform(-CELL / 2, CELL / 2, 2))
         for area in itertools.islice(areas(shape, rng), most):
-            rest = self._candidates(object_index, rng, collections.Counter(), shape, area, support)
+            rest = self._candidates((object_index,), rng, collections.Counter(), shape, area, support)
             for n in rng.permutation(len(rest.row))[:each]:
                 yield origin(shape, int(rest.row[n]), int(rest.col[n]), float(rest.height[n]))
 
     def _candidates(
         self,
-        object_index: int,
+        moving: Collection[int],
         rng: np.random.Generator,
         rejected: Rejections,
         shape: Footprint,
@@ -250,7 +255,7 @@ class Placer:
         cells = ColumnWindow.around(area.low, area.high)
         rows, cols = shape.underside.shape
         window = ColumnWindow(cells.row + shape.row, cells.col + shape.col, cells.rows + rows, cells.cols + cols)
-        level = self.query.level(window, area.height, without=(object_index,))
+        level = self.query.level(window, area.height, without=moving)
         every = np.arange(cells.rows * cells.cols)
         if area.allowed is not None:
             every = every[area.allowed(cells.row + every // cells.cols, cells.col + every % cells.cols)]
@@ -294,18 +299,18 @@ class Placer:
 
     def _let_go(self, task: _Task, pos: np.ndarray, quat: np.ndarray, area: PlacementArea, support: str) -> str:
         """Puts the object there and lets physics settle; the reason why that is no good, or ''."""
-        query, placed = self.query, task.object_index
+        query, placed, moves = self.query, task.object_index, task.moves
         exempt = task.others.touching[placed].copy()  # what lies on it may fall when it is taken away
-        exempt[[placed, *task.pushable]] = True
-        query.place(placed, pos, quat)
+        exempt[[*moves.all, *task.pushable]] = True
+        moves.put(query, pos, quat)
         if area.push_towards >= 0:
-            pos = self._pushed(placed, pos, quat, area.push_towards)
+            pos = self._pushed(moves, pos, quat, area.push_towards)
         for _ in range(LIFTS):
-            deep = query.penetration(placed)
+            deep = query.penetration(*moves.all)
             if deep <= PENETRATION:
                 break
             pos = pos + np.array([0.0, 0.0, deep])
-            query.place(placed, pos, quat)
+            moves.put(query, pos, quat)
         else:
             return "collides"
         loose = support == "loose" and area.loose
@@ -335,21 +340,21 @@ class Placer:
             return reason
         if not asleep and (np.asarray(query.view.awake[0, placed]) or task.others.restless().any()):
             return "not at rest"
-        if query.penetration(placed) > RESTING_PENETRATION:
+        if query.penetration(*moves.all) > RESTING_PENETRATION:
             return "stands in something"
         if not task.truth():
             return "predicate false"
         return ""
 
-    def _pushed(self, object_index: int, pos: np.ndarray, quat: np.ndarray, other: int) -> Float[np.ndarray, "3"]:
+    def _pushed(self, moves: Carried, pos: np.ndarray, quat: np.ndarray, other: int) -> Float[np.ndarray, "3"]:
         """The position after the object has been pushed level against another one, until they all but touch."""
         for _ in range(PUSHES):
-            distance, towards = self.query.clearance(object_index, other)
+            distance, towards = self.query.clearance(moves.bearer, other)
             level = np.array([*towards[:2], 0.0])
             if distance <= TOUCHING or np.linalg.norm(level) < 1e-6:
                 break
             pos = pos + level / np.linalg.norm(level) * (distance - TOUCHING / 2)
-            self.query.place(object_index, pos, quat)
+            moves.put(self.query, pos, quat)
         return pos
 
 

@@ -109,13 +109,13 @@ class SceneQuery:
         """Changes the world; see `ig2mj.engine.base.Write`."""
         self.physics = self.engine.write(self.physics, write)
 
-    def penetration(self, object_index: int) -> float:
-        """How deep an awake object stands in anything that is no part of it, metres; 0 where it does not."""
+    def penetration(self, *objects: int) -> float:
+        """How deep awake objects stand in anything that is no part of any of them, metres; 0 where they do not."""
         contact = self._data.contact
         if not len(contact.dist):
             return 0.0
-        owner = self._geom_object[contact.geom]
-        mine = (owner == object_index).any(1) & (owner[:, 0] != owner[:, 1])
+        own = np.isin(self._geom_object[contact.geom], objects)
+        mine = own[:, 0] != own[:, 1]
         return float(max(0.0, -contact.dist[mine].min(initial=0.0)))
 
     def penetrations(self) -> Float[np.ndarray, "O"]:

@@ -85,6 +85,7 @@ class RowSampler:
         keep: bool = False,
         again: Collection[str] = (),
         around: Sequence[Condition] = (),
+        carried: Collection[str] = (),
     ) -> Row | None:
         """A row, or None where the budget did not suffice; the world is left in it.
 
@@ -94,6 +95,7 @@ class RowSampler:
             that have been placed be pushed so long as their conditions hold; else every object is placed again.
           again: objects that are placed again nevertheless, on their flattest side.
           around: placements that hold, of objects that may be pushed so long as these hold.
+          carried: objects that go along with what is placed, in or on which they lie.
 
         Raises:
           StateError, AbilityError, UnknownNameError: a condition that can never be made true.
@@ -102,7 +104,7 @@ class RowSampler:
         plan = order(conditions, self._fixed, self._ranks if keep else None)
         self.query.load(self._start)
         self._states, self._keep, self._again = self._initial, keep, frozenset(again)
-        self._around = tuple(around)
+        self._around, self._carried = tuple(around), [object_index(self.model, n) for n in carried]
         self._others = Bystanders(self.query, self._start)
         placed = {name for name, requested in plan.placements if requested[0].value}
         self._joints = [c for c in plan.joints if c.arguments[0] in placed]
@@ -229,6 +231,7 @@ class RowSampler:
             along,
             flat=name in self._again,
             pushable=pushable,
+            carried=self._carried,
         )
         if not done:
             return False
