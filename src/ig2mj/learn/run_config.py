@@ -17,6 +17,7 @@ out has its default. `policies/*.toml` are the runs that the policies that ship 
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 import pathlib
 import tomllib
@@ -69,6 +70,19 @@ ALGORITHMS = ("sac", "ppo", "bc", "dagger")
 _FIX = "policies/CookingMeat.toml of the project is such a file"
 
 
+def _axes(text: str) -> Randomize | None:
+    """What `RunSettings.randomize` says. Raises Ig2mjError: it is no JSON; UnknownNameError, EngineError."""
+    if text == "all":
+        return Randomize.every()
+    if not text.lstrip().startswith("{"):
+        return Randomize.of([part.strip() for part in text.split(",")])
+    try:
+        return Randomize.of(json.loads(text))
+    except json.JSONDecodeError as e:
+        example = '{"objects": true, "robot_start": {"shift": 0.2}}'
+        raise Ig2mjError(f"randomize={text}: no JSON ({e}); axes with commas, or such as {example}") from None
+
+
 @dataclasses.dataclass(frozen=True)
 class RunSettings:
     """Settings of a run that belong to no algorithm.
@@ -88,7 +102,8 @@ class RunSettings:
       homes: "train", or names of homes with commas: worlds are shared out over them; "": the task's own.
       homes_in_turn: an iteration steps the worlds of one of several homes, in turn (sac and dagger, where worlds divide
         evenly over homes); false: of all of them.
-      randomize: axes of `ig2mj.Randomize` with commas, or "all"; "": nothing differs between episodes.
+      randomize: axes of `ig2mj.Randomize` with commas, "all", or axes with their settings as JSON, such as
+        {"objects": true, "robot_start": {"shift": 0.2}}; "": nothing differs between episodes.
       expert: for SAC: the task's scripted expert begins episodes and labels states.
       save_buffer: checkpoints hold the replay buffer; without it a resumed run first refills it.
       programs: compiled programs of an iteration: 1, or 2 to time simulation and learning separately.
@@ -122,8 +137,7 @@ class RunSettings:
             whole = len(names) == 1 and names[0] in HOMES
             found["homes"] = names[0] if whole else [_checked_home(name) for name in names]
         if self.randomize:
-            axes = Randomize.every() if self.randomize == "all" else Randomize.of(self.randomize.split(","))
-            found["randomize"] = axes
+            found["randomize"] = _axes(self.randomize)
         return found
 
     @property

@@ -40,7 +40,7 @@ from ig2mj.scene.object_requests import read_request
 from ig2mj.scene.paths import SHIPPED_HOMES, scene_folder
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import LinkKind
-from ig2mj.tasks.task import Acts, Fit, Near, Task
+from ig2mj.tasks.task import Acts, Fit, Near, Task, Vector3
 
 BODY = 0.27
 """m around the middle of a robot that are free of everything between `LOW` and `HIGH` above the floor."""
@@ -63,6 +63,12 @@ MARGIN = 0.06
 AHEAD, ASIDE = (0.28, 0.95), 0.55
 """m ahead of the robot, least and most, and to either side, where it sees what lies before it."""
 
+VIEW = (0.05, 1.0)
+"""m from the middle of a robot to its camera, ahead, and the tangent of half the angle that the camera sees."""
+
+SEEN = 0.7
+"""Share of a surface in reach that the camera sees, at least."""
+
 ENOUGH = 24
 """Points of a surface in reach: 0.06 m2. With fewer, hardly any sampled state would count."""
 
@@ -74,6 +80,9 @@ CLOSE = 0.02
 
 ELSE = 'ig2mj.make("activity/...", home=...) goes into any home that has what it needs'
 
+SAME_TOP = 0.05
+"""m by which a surface may be higher than that of an activity's own home, and the robot floats as high as there."""
+
 SITS = 0.05
 """m: fixed things no higher than this, such as carpets, are stood on."""
 
@@ -84,7 +93,8 @@ class Spot:
 
     Attributes:
       surface, anchor: objects of the home; anchor "" where none is needed. x, y: m. quarter: turns by 90 degrees of
-        what the robot faces, from x. height: m of the floor there. likeness: larger is more like the task's own home.
+        what the robot faces, from x. height: m of the floor there. top: m above the floor of the surface.
+      likeness: larger is more like the task's own home.
     """
 
     surface: str
@@ -93,6 +103,7 @@ class Spot:
     y: float
     quarter: int
     height: float
+    top: float
     likeness: float
 
 
@@ -304,6 +315,17 @@ def _spot(name: str, fit: Fit, own: tuple[float, float, float], folder: str) -> 
     return max(found, key=lambda spot: spot.likeness)
 
 
+def _points(low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"]) -> Float[np.ndarray, "N 3"]:
+    """Points of the top of a box."""
+    spread = np.array([*np.meshgrid(*(np.arange(low[k] + MARGIN, high[k] - MARGIN, STEP) for k in (0, 1)))])
+    return np.column_stack([spread.reshape(2, -1).T, np.full(spread[0].size, high[2])])
+
+
+def _in_view(ahead: Float[np.ndarray, "N"], left: Float[np.ndarray, "N"]) -> Bool[np.ndarray, "N"]:
+    """Whether a robot's camera sees points so many metres ahead and to the left of it."""
+    return np.abs(left) < VIEW[1] * (ahead - VIEW[0])
+
+
 def _spots(home: Household, fit: Fit, anchor: str, surface: str, rank: int) -> Iterator[Spot]:
     """Positions from which a surface and an anchor are in reach."""
     if anchor == surface:
@@ -324,10 +346,9 @@ def _spots(home: Household, fit: Fit, anchor: str, surface: str, rank: int) -> I
     elif anchor:
         box = home.box(anchor)
         target = np.array([*(0.5 * (box[0] + box[1]))[:2], box[1][2]])
-    spread = np.array([*np.meshgrid(*(np.arange(low[k] + MARGIN, high[k] - MARGIN, STEP) for k in (0, 1)))])
-    if not spread.size:
+    points = _points(low, high)
+    if not len(points):
         return
-    points = np.column_stack([spread.reshape(2, -1).T, np.full(spread[0].size, high[2])])
     middle = np.array([*(0.5 * (low + high))[:2]]) if target is None else target[:2]
     reach = AROUND + (0.5 * (high - low)[:2].max() if target is None else 0.0)
     for quarter in quarters:
@@ -371,21 +392,33 @@ def _judged(
     off = points - here
     least, most = AHEAD
     seen = (off @ ahead > least) & (off @ ahead < most) & (np.abs(off @ left) < ASIDE)
-    near = seen & (np.linalg.norm(points - shoulder, axis=1) < fit.within)
+    in_reach = np.linalg.norm(points - shoulder, axis=1) < fit.within
+    near = seen & in_reach
     if near.sum() < ENOUGH:
         return None
+    visible = 1.0 if fit.on_floor else float(_in_view(off @ ahead, off @ left)[in_reach].mean())
     height = home.floor(here[:2])
     likeness = min(float(near.sum()), 120.0) / 120.0 - 0.3 * rank
     if fit.target is not None and target is not None:
         offset = target - here
         likeness -= 2.0 * float(np.hypot(offset @ ahead - fit.target[0], offset @ left - fit.target[1]))
+    likeness -= 2.0 * max(0.0, SEEN - visible)
     gap = float((off[near] @ ahead).min())
     likeness -= 2.0 * max(0.0, gap - fit.gap)
-    return Spot(surface, anchor, round(x, 3), round(y, 3), quarter, round(height, 3), likeness)
+    return Spot(
+        surface, anchor, round(x, 3), round(y, 3), quarter, round(height, 3), round(float(points[0, 2]), 3), likeness
+    )
+
+
+@functools.lru_cache(maxsize=256)
+def _own_top(home: str, surface: str) -> float:
+    """m above the floor of a surface of a task's own home."""
+    return float(Household(bare_scene(home)).box(surface)[1][2])
 
 
 def _moved(task: Task, home: str, spot: Spot) -> Task:
-    """The task at a spot of another home."""
+    """The task at a spot of another home. The humanoid floats; above a surface that is higher than at home it floats as
+    much higher, so that its eyes and hands are as far above the surface."""
     fit = task.fit
     assert fit is not None
     own = _own(task)
@@ -401,19 +434,21 @@ def _moved(task: Task, home: str, spot: Spot) -> Task:
     turned = 90 * ((spot.quarter - round(own[2] / 90.0)) % 4)
     here, there = np.array([spot.x, spot.y, 0.0]), np.array([own[0], own[1], 0.0])
 
-    def place(pos: Any) -> tuple[float, ...]:
+    higher = 0.0 if fit.on_floor else round(spot.top - _own_top(task.home, fit.surface), 3)
+    raised = higher if higher > SAME_TOP else 0.0
+
+    def place(pos: Vector3 | tuple[float, float]) -> Any:
         offset = np.array([pos[0], pos[1], 0.0]) - there
         x, y, _ = here + (offset @ home_ahead) * ahead + (offset @ home_left) * left
         return (round(float(x), 3), round(float(y), 3), *pos[2:])
 
     def acts(name: str, one: Acts) -> Acts:
         assert one.pos is not None
-        height = one.pos[2] if name == "humanoid" and len(one.pos) == 3 else spot.height
-        return dataclasses.replace(one, pos=(*place(one.pos)[:2], height), yaw=(one.yaw + turned) % 360)
+        height = one.pos[2] + raised if name == "humanoid" and len(one.pos) == 3 else spot.height
+        return dataclasses.replace(one, pos=(*place(one.pos)[:2], round(height, 3)), yaw=(one.yaw + turned) % 360)
 
     def near(one: Near) -> Near:
-        x, y, z = place(one.pos)
-        return dataclasses.replace(one, pos=(x, y, z))
+        return dataclasses.replace(one, pos=place(one.pos))
 
     physical = task.physical
     if physical is not None:
