@@ -14,6 +14,7 @@ from ig2mj.agents import Humanoid
 from ig2mj.engine.view import blank_view, replace_fields
 from ig2mj.envs import registry
 from ig2mj.errors import EngineError, InputError
+from ig2mj.scene.bare_scenes import bare_scene
 from ig2mj.scene.paths import scene_folder
 from ig2mj.scene.scene import load_scene
 from ig2mj.tasks import relocation
@@ -23,7 +24,7 @@ from ig2mj.tasks.bddl.task import bddl_task
 from ig2mj.tasks.experts.quarters import quarter_turn, turned_view
 from ig2mj.tasks.homes import check_inside, in_home
 from ig2mj.tasks.registry import load_task
-from ig2mj.tasks.relocation import reason_against
+from ig2mj.tasks.relocation import Household, reason_against
 
 COOKING = ACTIVITIES["CookingMeat"]
 
@@ -109,6 +110,30 @@ def test_an_activity_goes_where_another_home_has_its_furniture():
     own, other = (np.array(t.near[0].pos) - t.robots["humanoid"].pos for t in (COOKING, moved))
     assert np.linalg.norm(own) == pytest.approx(np.linalg.norm(other), abs=2e-3)
     assert ncon_of_robot(scene) == 0
+
+
+def test_the_humanoid_is_as_high_above_higher_counters_as_at_home():
+    """Seen from 0.95 m above the floor, nothing on a counter of 1.05 m is in the image."""
+    at_home = COOKING.robots["humanoid"].pos
+    for home, top in (("elm", 0.93), ("willow", 1.045)):
+        moved = in_home(COOKING, home)
+        raised = moved.robots["humanoid"].pos[2] - at_home[2]
+        assert raised == pytest.approx(top - 0.93, abs=2e-3), home
+        assert moved.robots["fetch"].pos[2] == 0.0, "it stands on the floor"
+
+
+def test_where_objects_start_is_in_view():
+    """The stove of juniper has counters on its right only: the robot stands far enough to the right to see them."""
+    moved = in_home(COOKING, "juniper")
+    household = Household(bare_scene("juniper"))
+    low, high = household.box(moved.roles["bottom_cabinet_1"])
+    spread = np.meshgrid(*(np.arange(low[k], high[k], 0.05) for k in (0, 1)))
+    points = np.column_stack([*(axis.ravel() for axis in spread), np.full(spread[0].size, high[2])])
+    points = points[np.linalg.norm(points - moved.near[0].pos, axis=1) < 0.9]
+    yaw = np.radians(moved.robots["humanoid"].yaw)
+    off = points[:, :2] - moved.robots["humanoid"].pos[:2]
+    ahead, left = off @ [np.cos(yaw), np.sin(yaw)], off @ [-np.sin(yaw), np.cos(yaw)]
+    assert np.mean(np.abs(left) < ahead) > 0.65
 
 
 def ncon_of_robot(scene) -> int:
