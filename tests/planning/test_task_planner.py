@@ -1,6 +1,7 @@
 """Plans of the task planner, in the tiny home of the tests, carried out as PDDL and on the symbolic rung."""
 
 import collections
+import dataclasses
 import json
 
 import numpy as np
@@ -10,6 +11,7 @@ from planning_domain import World
 from ig2mj.cli import call
 from ig2mj.errors import UnknownNameError
 from ig2mj.planning import Domain, PlanningError, SymbolicRung, TaskPlanner, make_step, solve, summary
+from ig2mj.planning.facts import Facts
 from ig2mj.planning.pddl import domain_pddl, problem_pddl
 from ig2mj.planning.step_order import ordered
 from ig2mj.planning.steps import PRIMITIVES
@@ -113,6 +115,17 @@ def test_what_lies_on_an_object_goes_along_on_the_symbolic_rung(sampler, start):
     assert result.success and after.holds("on_top", "knife", "book")
     moved = [after.place(name) - before.place(name) for name in ("knife", "book")]
     assert np.linalg.norm(moved[1]) > 0.2 and abs(moved[0][2] - moved[1][2]) < 0.01
+
+
+def test_what_leans_against_another_object_does_not_go_along(sampler, start):
+    loaded = started(sampler, start, "(on_top knife book)")
+    facts = SymbolicRung(planner_of(sampler.model, "(on_top book stove)").domain, sampler, [loaded]).facts(0)
+    assert [(a.predicate, *a.arguments) for a in facts.borne("book")] == [("on_top", "knife", "book")]
+    touching = np.array(facts.view.touching)
+    knife, table = facts.domain.index("knife"), facts.domain.index("table")
+    touching[0, knife, table] = touching[0, table, knife] = True
+    leaning = Facts(facts.domain, facts.states, dataclasses.replace(facts.view, touching=touching))
+    assert leaning.borne("book") == ()
 
 
 def test_a_support_on_which_something_did_not_stay_is_laid_flat_if_it_is_not(sampler, start):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 
 Texture = Float[np.ndarray, "R X 3"]
 
@@ -19,16 +19,23 @@ class Material:
     """A material. Two are the same only if they are the same object.
 
     Attributes:
-      name: unique in a home. image: its texture; None: the plain colour. rgba: multiplied into the texture.
-      emission: part of its own colour that it shows without any light.
+      name: unique in a home. image: its texture, as floats or bytes; None: the plain colour.
+      rgba: multiplied into the texture. emission: part of its own colour that it shows without any light.
     """
 
     name: str
-    image: Texture | None = None
+    image: Texture | UInt8[np.ndarray, "R X 3"] | None = None
     rgba: tuple[float | int, float | int, float | int, float | int] = (1.0, 1.0, 1.0, 1.0)
     specular: float | int = 0.0
     shininess: float | int = 0.0
     emission: float | int = 0.0
+
+
+def texels(image: Texture | UInt8[np.ndarray, "R X 3"] | None) -> UInt8[np.ndarray, "R X 3"] | None:
+    """A texture as bytes."""
+    if image is None or image.dtype == np.uint8:
+        return image
+    return np.round(np.clip(image, 0, 1) * 255).astype(np.uint8)
 
 
 def noise(shape: tuple[int, int], cells: tuple[int, int], rng: np.random.Generator) -> Float[np.ndarray, "R X"]:

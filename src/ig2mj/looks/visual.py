@@ -15,10 +15,11 @@ from jaxtyping import Int
 from ig2mj.errors import EngineError
 from ig2mj.looks.costume import Followers, costumes_of, names_of
 from ig2mj.looks.furnishing import add_furnishing
-from ig2mj.looks.home_plan import read_plan
+from ig2mj.looks.home_plan import HomePlan, read_plan
 from ig2mj.looks.interior import TRIM, add_interior
+from ig2mj.looks.kept_decoration import Decoration, decoration_of
 from ig2mj.looks.light import DAY, NIGHT, Light, set_light
-from ig2mj.looks.materials import Material
+from ig2mj.looks.materials import Material, texels
 from ig2mj.looks.mesh import Builder, Triangles
 from ig2mj.looks.outside import add_outside
 from ig2mj.looks.state_looks import add_lamps, add_tinted_materials, lamp_lights
@@ -136,22 +137,26 @@ def decorate(spec: mujoco.MjSpec, scene: Scene, looks: str, fine: bool = True) -
     _dress(spec, scene)
     add_tinted_materials(spec, scene)
     add_lamps(spec, scene)
-    build, plan = Builder(fine), read_plan(scene)
+    plan = read_plan(scene)
     if plan is None:
         return
-    add_interior(build, plan, light)
-    add_furnishing(build, plan, light)
-    garden = Builder(fine)
-    add_outside(garden, plan, light, night=looks == "night")
-    body = spec.worldbody.add_body(name=DECOR)
-    for material, mesh in build.meshes():
+    body, night = spec.worldbody.add_body(name=DECOR), looks == "night"
+    for material, mesh in decoration_of(lambda: _decoration(plan, light, night, fine), plan, light, night, fine):
         _add(spec, body, material, mesh)
-    for material, mesh in garden.meshes():
-        _add(spec, body, dataclasses.replace(material, name=f"{OUTSIDE}{material.name}"), mesh)
     for entry in scene.manifest.objects:
         if entry.category == "walls":
             for geom in (g for name in entry.bodies for g in spec.body(name).geoms if g.group == 0 and not g.material):
                 geom.rgba = [*TRIM, 1.0]
+
+
+def _decoration(plan: HomePlan, light: Light, night: bool, fine: bool) -> Decoration:
+    """What is added to a home and around it."""
+    build, garden = Builder(fine), Builder(fine)
+    add_interior(build, plan, light)
+    add_furnishing(build, plan, light)
+    add_outside(garden, plan, light, night)
+    outside = ((dataclasses.replace(m, name=f"{OUTSIDE}{m.name}"), mesh) for m, mesh in garden.meshes())
+    return [*build.meshes(), *outside]
 
 
 def _dress(spec: mujoco.MjSpec, scene: Scene) -> None:
@@ -177,17 +182,16 @@ def _add(spec: mujoco.MjSpec, body: mujoco.MjsBody, material: Material, mesh: Tr
     name = f"ig2mj/{material.name}"
     values = dict(name=name, rgba=material.rgba, specular=material.specular, shininess=material.shininess)
     made = spec.add_material(**values, emission=material.emission)
-    if material.image is not None:
-        texels = np.round(np.clip(material.image, 0, 1) * 255).astype(np.uint8)
+    if (image := texels(material.image)) is not None:
         texture = spec.add_texture(
             name=name,
             type=mujoco.mjtTexture.mjTEXTURE_2D,
             colorspace=mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR,
-            width=texels.shape[1],
-            height=texels.shape[0],
+            width=image.shape[1],
+            height=image.shape[0],
             nchannel=3,
         )
-        texture.data = texels.tobytes()
+        texture.data = image.tobytes()
         made.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
     asset = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
     asset.uservert, asset.userface = mesh.vertices.ravel(), mesh.faces.ravel()

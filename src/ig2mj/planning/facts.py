@@ -100,7 +100,8 @@ class Facts:
         return tuple(a.arguments[0] for a in near if truth[a])
 
     def borne(self, name: str) -> tuple[Atom, ...]:
-        """What says of loose objects that they are in or on an object, or in or on these, but for what hands hold."""
+        """What says of loose objects that they are in or on an object, or in or on these, but for what hands hold. What
+        is on something touches nothing else: what leans against another object does not stay on it when it is taken."""
         found: dict[str, Atom] = {}
         bearers = [name]
         for bearer in bearers:
@@ -110,9 +111,21 @@ class Facts:
                 above = (low <= middle).all() and (middle[:2] <= high[:2]).all()
                 if above and other not in (name, bearer, *found, *self.held):
                     near += [Atom(predicate, (other, bearer)) for predicate in ("inside", "on_top")]
-            found |= {a.arguments[0]: a for a, holds in reversed(self.truth(near).items()) if holds}
+            true = [a for a, holds in reversed(self.truth(near).items()) if holds]
+            found |= self._staying({a.arguments[0]: a for a in true}, bearer)
             bearers += [other for other in found if other not in bearers]
         return tuple(found.values())
+
+    def _staying(self, borne: dict[str, Atom], bearer: str) -> dict[str, Atom]:
+        """Of what is in or on a bearer, what is in it, and what touches nothing but it and others that stay."""
+        touching = np.asarray(self.view.touching)[0]
+        touched = {name: set(np.flatnonzero(touching[self.domain.index(name)]).tolist()) for name in borne}
+        while True:
+            own = {self.domain.index(name) for name in (bearer, *borne)}
+            kept = {n: atom for n, atom in borne.items() if atom.predicate == "inside" or touched[n] <= own}
+            if len(kept) == len(borne):
+                return kept
+            borne = kept
 
     def room(self, name: str) -> str:
         """Room instance above whose floor an object is; the home's floor object where the map has none there."""

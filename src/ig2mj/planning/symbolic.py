@@ -222,15 +222,17 @@ class SymbolicRung:
         rejected: Rejections = collections.Counter()
         self._sampler.start_from(own.physics, own.states)
         try:
-            facts = self.facts(world)
+            facts, row = self.facts(world), None
             borne = facts.borne(step.object) if step.primitive in CARRIES else ()
-            around = [*self._around(step, facts, own.held), *map(condition_of, borne)]
-            carried = [atom.arguments[0] for atom in borne]
+            inside = tuple(atom for atom in borne if atom.predicate == "inside")
+            around = self._around(step, facts, own.held)
             again = [step.object] if step.flat else ()
             required = list(step.adds if conditions is None else conditions)
-            row = self._sampler.sample(
-                required, rng, Budget(WORK), rejected, around=around, carried=carried, again=again
-            )
+            for along in dict.fromkeys((borne, inside)):  # at last without what is on it, which falls off
+                also, carried = [*around, *map(condition_of, along)], [atom.arguments[0] for atom in along]
+                row = row or self._sampler.sample(
+                    required, rng, Budget(WORK), rejected, again=again, around=also, carried=carried
+                )
         except (StateError, AbilityError) as e:
             return Outcome("not_true_after", str(e))
         if row is None:
