@@ -7,8 +7,9 @@ import pytest
 from ig2mj.cli import call
 from ig2mj.demos import Recording, replay
 from ig2mj.demos.selection import chosen_runs, left_out
-from ig2mj.demos.solving import Episodes
+from ig2mj.demos.solving import Episodes, horizon_for
 from ig2mj.planning import Domain, TaskPlanner, problem_of
+from ig2mj.planning.physics import most_seconds
 
 pytestmark = pytest.mark.slow
 
@@ -40,7 +41,7 @@ def test_successes_replay_bit_for_bit_where_they_were_recorded(solved):
         assert [s["primitive"] for s in plans[0]["steps"]] == ["grasp", "place_on_top"]
         assert recording.value("made_with", dict)["split"] == "held_out"
         # The horizon follows the plan: two steps.
-        assert recording.value("horizon", int) == horizon == round((2 * 60 + 100) / 0.1)
+        assert recording.value("horizon", int) == horizon == round((2 * 120 + 200) / 0.1)
     done = replay(file)
     assert not done.differences and done.runs == 2
 
@@ -95,3 +96,9 @@ def test_recorded_plans_become_strips_and_a_page_of_them(solved, tmp_path, capsy
     page = tmp_path / "gallery.md"
     assert call(["demos", "gallery", str(file), "--out", str(page)]) == 0
     assert "images/gallery/runs.jpg" in page.read_text() and "2 primitives" in page.read_text()
+
+
+def test_horizons_of_plans_that_clean_are_as_long_as_cleaning_may_last():
+    assert horizon_for(2) == round((2 * 120 + 200) / 0.1)
+    assert horizon_for(2, cleaning=1) == round((120 + 900 + 200) / 0.1)
+    assert most_seconds("scrub") == 900.0 and most_seconds("grasp") == 300.0

@@ -138,9 +138,18 @@ def test_what_is_tiny_lies_below_the_fingers_of_a_palm_from_above_and_not_below_
     points = np.zeros((3, 3))
     bean = 0.01 * np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
     stick = bean * (20.0, 1.0, 1.0)
-    behind = -grasps.BEHIND_TINY * fingers
-    assert np.allclose(grasps._under_fingers(bean, points, fingers, palms), [behind[0], behind[1], points[2]])
-    assert np.allclose(grasps._under_fingers(stick, points, fingers, palms), [points[0], behind[1], points[2]])
+    behind, count = -grasps.BEHIND_TINY * fingers, len(grasps.OFF_TINY)
+    which, found = grasps._under_fingers(bean, points, fingers, palms)
+    assert which.tolist() == [*[0] * count, *[1] * count, 2]
+    assert np.allclose(found[[0, count, -1]], [behind[0], behind[1], points[2]])
+    beside = found[1:3] - behind[0]
+    assert np.allclose(beside @ fingers[0], 0.0) and np.allclose(beside @ palms[0], 0.0)
+    assert np.allclose(beside.sum(0), 0.0) and not np.allclose(beside[0], 0.0)
+    which, found = grasps._under_fingers(stick, points, fingers, palms)
+    along = len(grasps.OFF_SLENDER)
+    assert which.tolist() == [*[0] * along, *[1] * count, 2]
+    assert np.allclose(found[[0, along, -1]], [points[0], behind[1], points[2]])
+    assert np.allclose(found[:along] @ fingers[0], 0.0) and np.ptp(found[:along] @ fingers[1]) > 0.0
 
 
 def test_what_slides_is_taken_by_its_sides_at_several_heights_and_places(world):
@@ -168,3 +177,29 @@ def test_floor_from_where_hands_reach_with_ease_comes_first(world, monkeypatch):
 
     monkeypatch.setattr(PlannedWorld, "floor", shut)
     assert clutter._nearer(world, step, point) == world.body.reach
+
+
+def test_what_lies_upon_a_thing_is_known_and_what_stands_next_to_it_is_not(world, monkeypatch):
+    boxes = {
+        "book": ([0.0, 0.0, 0.0], [0.2, 0.2, 0.02]),
+        "apple": ([0.1, 0.1, 0.02], [0.18, 0.18, 0.1]),
+        "ball": ([0.25, 0.0, 0.0], [0.3, 0.1, 0.1]),
+    }
+    facts = types.SimpleNamespace(box=lambda name: tuple(map(np.array, boxes[name])))
+    monkeypatch.setattr(PlannedWorld, "facts", facts)
+    monkeypatch.setattr(clutter, "_loose", lambda world, step: [n for n in boxes if n not in step.things])
+    assert clutter.lying_upon(world, Step("grasp", ("book",))) == "apple"
+    assert clutter.lying_upon(world, Step("grasp", ("apple",))) is None
+    assert clutter.lying_upon(world, Step("open", ("book",))) is None
+
+
+def test_lids_and_flaps_are_no_part_of_what_is_taken_hold_of(world):
+    tables = world.domain.model.tables
+    book, apple, cabinet = (world.index(name) for name in ("book", "apple", "cabinet"))
+    own = np.flatnonzero(tables.piece_object == book)
+    flapped = dataclasses.replace(
+        tables, piece_object=np.where(tables.piece_object == apple, book, tables.piece_object)
+    )
+    assert (flapped.piece_object == book).sum() > len(own)
+    assert np.array_equal(grasps.main_pieces(flapped, book), own)
+    assert np.array_equal(grasps.main_pieces(tables, cabinet), np.flatnonzero(tables.piece_object == cabinet))

@@ -27,7 +27,7 @@ from ig2mj.envs.planning_stage import EnvironmentStage, problem_env
 from ig2mj.errors import EngineError
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.motion_planner import MotionPlanner
-from ig2mj.planning.physics import PhysicsRung, check_robot
+from ig2mj.planning.physics import CLEANING, PhysicsRung, check_robot, most_seconds
 from ig2mj.planning.problem import Problem
 from ig2mj.planning.results import row_of
 from ig2mj.planning.solver import EpisodeResult, Watch, solve, unwatched
@@ -37,7 +37,8 @@ from ig2mj.process import entry_point
 from ig2mj.sampling.query import SceneQuery
 
 SECONDS_PER_STEP, SECONDS_MORE = 120.0, 200.0
-"""Simulated s of an episode's horizon: for each step of its plan, and more, as long as BEHAVIOR's activities last."""
+"""Simulated s of an episode's horizon: for each step of its plan, and more, as long as BEHAVIOR's activities last. A
+step that cleans counts as long as it may last (`ig2mj.planning.physics.most_seconds`)."""
 
 ON_WHEELS = 2
 """By how much longer episodes of robots with wheels last: an arm moves its hand at half a floating hand's speed."""
@@ -46,9 +47,11 @@ PLAN = "plan"
 """Attribute of a run: what was done, as JSON (`ig2mj.planning.results.row_of`), and the `number` of the episode."""
 
 
-def horizon_for(steps: int, period: float = ACTION_PERIOD) -> int:
-    """Agent steps that an episode with a plan of so many steps may take. `period`: s of one."""
-    return math.ceil((SECONDS_PER_STEP * steps + SECONDS_MORE) / period)
+def horizon_for(steps: int, period: float = ACTION_PERIOD, cleaning: int = 0) -> int:
+    """Agent steps that an episode with a plan of so many steps may take. `period`: s of one. `cleaning`: steps of the
+    plan that clean."""
+    cleans = cleaning * (most_seconds(CLEANING[0]) - SECONDS_PER_STEP)
+    return math.ceil((SECONDS_PER_STEP * steps + cleans + SECONDS_MORE) / period)
 
 
 @entry_point
@@ -116,8 +119,10 @@ class Episodes:
         pool, longest = self.problem.pool(split, rows), 0
         numbers = self.numbers[:1] if pool is None else self.numbers
         for _, rung in symbolic_episodes(self.planner.domain, self.problem.scene, pool, numbers):
-            longest = max(longest, len(self.planner.plan(rung.facts(0)).steps))
-        return horizon_for(longest)
+            steps = self.planner.plan(rung.facts(0)).steps
+            cleaning = sum(step.primitive in CLEANING for step in steps)
+            longest = max(longest, horizon_for(len(steps), cleaning=cleaning))
+        return longest
 
     def solve(
         self,

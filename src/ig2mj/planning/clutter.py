@@ -26,6 +26,9 @@ GAIN = 0.25
 """m by which floor has to be nearer to what a step is about than floor in reach, for things to be moved out of the way
 there."""
 
+UPON = 0.03
+"""m above an object's top up to which the bottom of what lies upon it is."""
+
 NEAR_WAY, HIGH = 0.3, 1.05
 """m from a way within which a thing is in it, and height from which on it is above it."""
 
@@ -36,6 +39,7 @@ def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, 
     if all(world.held) or not isinstance(world.body, HandedBody):
         return False
     name = clutter_in_the_way(world, step)
+    name = lying_upon(world, step) if name is None else name
     if name is None:
         return False
     try:
@@ -78,6 +82,20 @@ def clutter_in_the_way(world: PlannedWorld, step: Step) -> str | None:
         if near.any():
             met.append((int(np.argmax(near)), name))
     return min(met)[1] if met else None
+
+
+def lying_upon(world: PlannedWorld, step: Step) -> str | None:
+    """What lies upon an object that is to be taken, so that a hand has no room there, the highest; None: nothing."""
+    if step.primitive != "grasp":
+        return None
+    low, high = world.facts.box(step.object)
+    middle, found = (low[2] + high[2]) / 2, list[tuple[float, str]]()
+    for name in _loose(world, step):
+        bottom, top = world.facts.box(name)
+        over = (bottom[:2] < high[:2]).all() and (top[:2] > low[:2]).all()
+        if over and middle < bottom[2] < high[2] + UPON and world.domain.graspable(name):
+            found.append((float(top[2]), name))
+    return max(found)[1] if found else None
 
 
 def _nearer(world: PlannedWorld, step: Step, point: Float[np.ndarray, "3"]) -> float:

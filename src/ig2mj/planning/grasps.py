@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.world import PlannedWorld, Vector
+from ig2mj.scene.tables import SceneTables
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -65,6 +66,11 @@ GRAVITY, MOST_TORQUE, BURDEN = 9.81, 6.0, 0.6
 
 TINY, BEHIND_TINY = 0.05, 0.04
 """m along palm and fingers up to which a thing is tiny, and by which a palm that floats is behind its middle then."""
+
+OFF_TINY = ((BEHIND_TINY, 0.0), (BEHIND_TINY, 0.02), (BEHIND_TINY, -0.02), (0.065, 0.0), (0.085, 0.0))
+OFF_SLENDER = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02), (0.0, 0.03), (0.0, -0.03))
+"""m by which a palm is behind what is tiny, or lies along the fingers and is as narrow, and beside it, the best first:
+next to a wall it lies below the outer fingers, or their tips."""
 
 MIDDLES = 8
 """Pieces whose middles are aimed at, at most."""
@@ -135,6 +141,7 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     normals = np.array([normal for normal, _ in _SIDES])
     origins = aims[None] + size * normals[:, None]
     main = np.flatnonzero((tables.graspable_object == index) & (tables.graspable_joint < 0))
+    trunk = world.vertices_of_pieces(main_pieces(tables, index))
     rays = origins.reshape(-1, 3), np.repeat(-normals, len(aims), axis=0)
     hits = obstacles.entries(*rays, index)
     if len(main):  # not of lids and flaps, which hands do not take hold of
@@ -143,7 +150,7 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
         )
     points, fingers, palms = [], [], []
     for (normal, ways), start, away in zip(_SIDES, origins, hits.reshape(len(normals), -1), strict=True):
-        outermost = float((corners @ normal).max())
+        outermost = float((trunk @ normal).max())
         taken: list[Vector] = []
         for origin, hit in zip(start, away, strict=True):
             point = origin - (hit if np.isfinite(hit) else 0.0) * normal
@@ -165,7 +172,8 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
         which, points = between_fingers(own, points, fingers, palms, body.opening)
         fingers, palms = fingers[which], palms[which]
     else:
-        points = _under_fingers(corners, points, fingers, palms)
+        which, points = _under_fingers(corners, points, fingers, palms)
+        fingers, palms = fingers[which], palms[which]
     if not len(points):
         return []
     spheres = np.stack([body.hand_spheres(f, p) for f, p in zip(fingers, palms, strict=True)])
@@ -188,21 +196,39 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     ]
 
 
+def main_pieces(tables: SceneTables, index: int) -> Int[np.ndarray, "n"]:
+    """Pieces of an object that hands take hold of: without lids and flaps, which stand out when they are open; all of
+    what they do not take hold of."""
+    own = tables.piece_object == index
+    main = tables.graspable_body[(tables.graspable_object == index) & (tables.graspable_joint < 0)]
+    return np.flatnonzero(own & np.isin(tables.piece_body, main) if len(main) else own)
+
+
 def _under_fingers(
     corners: Float[np.ndarray, "V 3"],
     points: Float[np.ndarray, "N 3"],
     fingers: Float[np.ndarray, "N 3"],
     palms: Float[np.ndarray, "N 3"],
-) -> Float[np.ndarray, "N 3"]:
-    """Points for a palm that comes from above: on what is tiny, so far behind it that it lies below the fingers. Below
-    the palm, fingers that close are stopped by what it lies on before they come to it.
+) -> tuple[Int[np.ndarray, "M"], Float[np.ndarray, "M 3"]]:
+    """Points for a palm that comes from above, with the numbers of the poses from which they come: on what is tiny, so
+    far behind it that it lies below the fingers. Below the palm, fingers that close are stopped by what it lies on
+    before they come to it.
 
     Args:
       corners: of the object.
     """
-    tiny = (np.ptp(corners @ palms.T, axis=0) < TINY) & (np.ptp(corners @ fingers.T, axis=0) < TINY)
-    tiny &= palms[:, 2] < -UPRIGHT
-    return points - BEHIND_TINY * tiny[:, None] * fingers
+    across = np.cross(fingers, palms)
+    low, ahead, aside = (np.ptp(corners @ axes.T, axis=0) < TINY for axes in (palms, fingers, across))
+    low &= palms[:, 2] < -UPRIGHT
+    tiny, slender = low & ahead, low & ~ahead & aside
+    which, offset = [np.flatnonzero(~tiny & ~slender)], [np.zeros((int((~tiny & ~slender).sum()), 3))]
+    for kind, offsets in ((tiny, OFF_TINY), (slender, OFF_SLENDER)):
+        for behind, beside in offsets:
+            which.append(np.flatnonzero(kind))
+            offset.append((beside * across - behind * fingers)[kind])
+    order = np.argsort(np.concatenate(which), kind="stable")
+    which = np.concatenate(which)[order]
+    return which, points[which] + np.concatenate(offset)[order]
 
 
 def _fingers_have_room(

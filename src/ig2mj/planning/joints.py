@@ -62,6 +62,17 @@ class OpenableJoint:
         """Whether a point is in the box of the link, as what lies in a drawer is."""
         return bool((self.vertices.min(0) <= point).all() and (point <= self.vertices.max(0)).all())
 
+    def is_above(self, other: OpenableJoint) -> bool:
+        """Whether the link is above that of another joint, as drawers are, where both were shut."""
+        mine, low = self.shut, other.shut
+        over = (mine.max(0) > low.min(0))[:2].all() and (low.max(0) > mine.min(0))[:2].all()
+        return bool(over and mine[:, 2].mean() > low[:, 2].max())
+
+    @property
+    def shut(self) -> Float[np.ndarray, "V 3"]:
+        """Corners of the link where it would be if the joint were closed."""
+        return self.moved(self.vertices, self.closed - self.now)
+
     def moved(self, points: Float[np.ndarray, "V 3"], by: float) -> Float[np.ndarray, "V 3"]:
         """Points of the link after the joint has moved."""
         if not self.hinge:

@@ -67,6 +67,10 @@ WIDE, FAR_OUT, TRIES = 0.5, 0.8, 2
 """Shares of their ranges from which on a door, and a drawer, is not in the way of a hand, and times that it is moved
 out of the way."""
 
+AT_END = 0.9
+"""Share of its range from which on a door is not opened further: at last it is opened to its end, where its leaf stands
+beside what it shuts and leaves the robot room in front of that."""
+
 LIFTED, HOOKED = 0.2, 12
 """Share of its range from which on a lid's inner face is pushed; agent steps in which fingers get below its edge."""
 
@@ -148,9 +152,17 @@ def open_around(world: PlannedWorld, name: str, tried: Tried) -> Generator[Progr
 
 
 def open_into(world: PlannedWorld, where: str, tried: Tried) -> Generator[Program, str, bool]:
-    """Opens a door or drawer of a container, the largest first; arguments and result as of `open_around`."""
+    """Opens a door or drawer of a container, the largest first, after those that were open without one above them had
+    no place; shuts drawers above it before. Arguments and result as of `open_around`."""
     found = joints_of(world, where) if world.domain.opens(where) else []
-    return (yield from _move_one(world, found, [], tried))
+    out = [j for j in found if not j.hinge and j.fraction > AJAR]
+    for joint in out:
+        tried[f"{joint.name} full"] += not any(o.is_above(joint) for o in out)
+    left = [j for j in found if j.hinge or not tried[f"{j.name} full"]]
+    for joint in [j for j in left if not j.hinge][:1]:
+        if (yield from _move_one(world, [joint], [o for o in out if o.is_above(joint)], tried, closes_first=True)):
+            return True
+    return (yield from _move_one(world, left, [], tried))
 
 
 def _move_one(
@@ -160,18 +172,19 @@ def _move_one(
     tried: Tried,
     closes_first: bool = False,
 ) -> Generator[Program, str, bool]:
-    """Opens the first that is not wide open, else shuts the first that is open; `closes_first`: the other way about, as
-    below an open drawer hands have little room."""
+    """Opens the first that is not wide open, else shuts the first that is open, else opens doors to their ends;
+    `closes_first`: shuts before it opens, as below an open drawer hands have little room."""
     if all(world.held):
         return False
     shut = [j for j in opened if j.fraction < (WIDE if j.hinge else FAR_OUT) and tried[j.name] < TRIES]
     out = [j for j in closed if j.fraction > AJAR and tried[f"{j.name} shut"] < TRIES]
-    if not shut and not out:
+    wider = [j for j in opened if j.hinge and WIDE <= j.fraction < AT_END and tried[f"{j.name} wider"] < TRIES]
+    if not shut and not out and not wider:
         return False
-    opens = bool(shut) and not (closes_first and out)
-    joint = shut[0] if opens else out[0]
-    key = joint.name if opens else f"{joint.name} shut"
-    yield from move_joint(world, joint, free_hand(world, tried[key]), opens, tried[key])
+    opens, to = not out or (bool(shut) and not closes_first), OPEN_TO if shut else 1.0
+    joint = (shut or wider)[0] if opens else out[0]
+    key = f"{joint.name} shut" if not opens else joint.name if shut else f"{joint.name} wider"
+    yield from move_joint(world, joint, free_hand(world, tried[key]), opens, tried[key], to)
     now = {j.name: j.fraction for j in joints_of(world, joint.object)}
     tried[key] += _progress(joint, now, opens) < MOVED  # else the same way again, from where it is now
     return True

@@ -32,8 +32,17 @@ from ig2mj.planning.steps import Outcome, PlanningError, Step, UnsupportedPrimit
 from ig2mj.planning.world import PlannedWorld
 from ig2mj.sampling.query import SceneQuery
 
-MOST_STEPS = 3000
-"""Agent steps of one primitive, 300 s, after which it fails with "timeout"."""
+MOST_STEPS, MOST_STEPS_CLEANING = 3000, 9000
+"""Agent steps of one primitive after which it fails with "timeout": 300 s, and 900 s of one that cleans, which presses
+its tool at up to 8 places from each of up to 24 stances (`ig2mj.planning.cleaning`)."""
+
+CLEANING = ("wipe", "scrub")
+"""Primitives that clean."""
+
+
+def most_seconds(primitive: str) -> float:
+    """Simulated s of a primitive after which it fails with "timeout"."""
+    return (MOST_STEPS_CLEANING if primitive in CLEANING else MOST_STEPS) * ACTION_PERIOD
 
 
 def check_robot(robot: str | TaskRobot) -> None:
@@ -179,6 +188,11 @@ class PhysicsRung:
         """Simulated seconds of a world's present primitive, or of its last one."""
         return self._steps[world] * ACTION_PERIOD
 
+    def _most(self, world: int) -> float:
+        """Simulated s that a world's present primitive may take."""
+        step = self._asked[world]
+        return most_seconds("" if step is None else step.primitive)
+
     def asked(self, world: int) -> Step | None:
         """The primitive that a world's robot began last; None: there was none."""
         return self._asked[world]
@@ -234,9 +248,9 @@ class PhysicsRung:
         """
         self._steps[world] += round(seconds / ACTION_PERIOD)
         running = self._running[world]
-        if running is not None and self._steps[world] > MOST_STEPS:
+        if running is not None and self.elapsed(world) > self._most(world):
             running.close()
-            self._end(world, Outcome("timeout", f"{MOST_STEPS * ACTION_PERIOD:.0f} s have passed"))
+            self._end(world, Outcome("timeout", f"{self._most(world):.0f} s have passed"))
         elif running is not None:
             self._next(world, reason)
         return self.take_ended()
@@ -272,8 +286,8 @@ class PhysicsRung:
             if over is not None:
                 running.close()
                 self._end(world, Outcome("timeout" if over else "", over))
-            elif self._steps[world] > MOST_STEPS:
+            elif self.elapsed(world) > self._most(world):
                 running.close()
-                self._end(world, Outcome("timeout", f"{MOST_STEPS * ACTION_PERIOD:.0f} s have passed"))
+                self._end(world, Outcome("timeout", f"{self._most(world):.0f} s have passed"))
             elif not self._carry.running[world]:
                 self._next(world, self._carry.reason(world))

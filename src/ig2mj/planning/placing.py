@@ -20,6 +20,7 @@ from ig2mj.planning.moves import (
     OPENS,
     OVER,
     RETREAT,
+    TOUCHES,
     UP,
     Primitive,
     PrimitiveFailed,
@@ -53,6 +54,9 @@ DEEP = 0.4
 
 LOW_DROPS, DEEP_DROPS = (0.0, 0.05, 0.1), (0.0, 0.05, 0.1, 0.16, 0.22, 0.28, 0.35, 0.42)
 """m above its place at which an object is let go where the hand has no room lower: onto something, and into it."""
+
+TIGHT = 0.12
+"""m above its place from which on what is let go into something narrow may touch its sides."""
 
 DROPS = {"inside": DEEP_DROPS, "on_top": LOW_DROPS, "on_floor": LOW_DROPS, "next_to": LOW_DROPS, "under": (0.0,)}
 
@@ -149,7 +153,7 @@ def _way(
     target, quat, rotation = grip_for(world, hand, name, spot)
     fingers, palm = world.hand_axes(hand, rotation)
     target = target + (LET_GO + spot.drop) * UP
-    spheres = world.spheres(fingers, palm, holding=name, hand=hand, rotation=rotation)
+    spheres = _spheres(world, name, hand, spot)
     obstacles = world.obstacles([name], world.stance)
     start = turning_point(obstacles, spheres, world.grip(hand), yaw)
     follows = world.follows(hand, quat, obstacles)
@@ -157,6 +161,13 @@ def _way(
     if way is None:
         return None
     return start, way, target, quat, _drawn_back(obstacles, world.spheres(fingers, palm), target, palm)
+
+
+def _spheres(world: PlannedWorld, name: str, hand: int, spot: Spot) -> Float[np.ndarray, "S 4"]:
+    """Spheres of a hand with an object, about its grasp point, with the object turned as it would be at a spot."""
+    _, _, rotation = grip_for(world, hand, name, spot)
+    found = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+    return np.where((found[:, 3:] < HELD) & spot.tight, found * (1.0, 1.0, 1.0, TOUCHES), found)
 
 
 def _drawn_back(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], target: Vector, palm: Vector) -> Vector:
@@ -202,6 +213,9 @@ def _find(
                 found = _plan(world, predicate, name, hand, spots)
                 if not isinstance(found, str):
                     break
+        if found == _NO_WAY and predicate == "inside":
+            tight = (dataclasses.replace(spot, tight=True) for spot in spots_for(world, predicate, name, where))
+            found = _plan(world, predicate, name, hand, tight)
     return found, ()
 
 
@@ -250,14 +264,14 @@ def _has_room(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], goal: Vec
 
 
 def _drop(
-    obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], goal: Vector, drops: Sequence[float]
+    obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], goal: Vector, drops: Sequence[float], over: float = OVER
 ) -> float | None:
     """The least of some heights above a place at which the hand has room, and from where what it holds falls freely to
-    the place, m; None: there is none."""
+    `over` (m) above the place, m; None: there is none."""
     held = spheres[spheres[:, 3] < HELD]
     for drop in drops:
         if _has_room(obstacles, spheres, goal + drop * UP):
-            free = drop == 0.0 or straight(obstacles, held, goal + drop * UP, goal + OVER * UP)
+            free = drop <= over or straight(obstacles, held, goal + drop * UP, goal + over * UP)
             return drop if free else None
     return None
 
@@ -297,10 +311,10 @@ def _plan(
         nonlocal lacking
         later, last = [], []
         for spot in proposed:
-            target, _, rotation = grip_for(world, hand, name, spot)
-            spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+            target, _, _ = grip_for(world, hand, name, spot)
+            spheres = _spheres(world, name, hand, spot)
             lacking = _NO_WAY if lacking == _NO_SPOT else lacking
-            drop = _drop(obstacles, spheres, target + LET_GO * UP, DROPS[predicate])
+            drop = _drop(obstacles, spheres, target + LET_GO * UP, DROPS[predicate], TIGHT if spot.tight else OVER)
             if drop is None:
                 continue
             target = target + drop * UP
@@ -330,8 +344,8 @@ def _plan(
 
     def has_way(candidate: tuple[Stance, Spot], search: bool) -> bool:
         stance, spot = candidate
-        target, quat, rotation = grip_for(world, hand, name, spot)
-        spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+        target, quat, _ = grip_for(world, hand, name, spot)
+        spheres = _spheres(world, name, hand, spot)
         back, standing = [UP, -ahead(stance.yaw)], world.standing(obstacles, stance, hand)
         start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
         follows = world.follows(hand, quat, standing, stance)

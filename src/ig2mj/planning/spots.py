@@ -15,6 +15,7 @@ from ig2mj.planning.bodies import CORNER
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.free_floor import NEAR_START
+from ig2mj.planning.joints import AJAR, OpenableJoint, openable_joints
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.steps import Step
 from ig2mj.planning.world import PlannedWorld, Rotation, Vector
@@ -68,12 +69,14 @@ UP = np.array([0.0, 0.0, 1.0])
 @dataclasses.dataclass(frozen=True, eq=False)
 class Spot:
     """Where an object is to be: position (m) and orientation (w-x-y-z) of its main body, world frame; `roofed`: inside
-    something, with a part of it above; `drop`: m above it at which the hand lets go."""
+    something, with a part of it above; `drop`: m above it at which the hand lets go; `tight`: it touches the sides on
+    its way down."""
 
     pos: Vector
     quat: Float[np.ndarray, "4"]
     roofed: bool = False
     drop: float = 0.0
+    tight: bool = False
 
 
 def spots_for(
@@ -101,6 +104,10 @@ def spots_for(
     without_contact = [c for c in requested if c.predicate in WITHOUT_CONTACT]
     placer, farther = Placer(world.query), _out_of_reach(world)
     middle = _middle_of_fixed_part(world, where) if predicate == "inside" else None
+    own = (
+        openable_joints(world.stage.scene, world.view, world.index(where), world.world) if predicate == "inside" else []
+    )
+    drawers = [j for j in own if not j.hinge]
     around = world.obstacles([name], stays=False)
     wide = max(CORNER, WIDE * float(np.sort(np.ptp(world.vertices(name), axis=0))[1]) / 2)
     turned = [(quat, angle) for quat in _upright(world, name, flat) for angle in TURNS]
@@ -119,6 +126,7 @@ def spots_for(
             if middle is not None:  # below openings, and away from where doors shut
                 roofed = _roofed(positions, around, wide)
                 cost += np.linalg.norm((positions - middle)[:, :2], axis=1) + ROOFED * roofed
+                cost[_shut_away(positions, drawers)] = np.inf
             for k in np.argsort(cost, kind="stable"):
                 pos = positions[k]
                 if not np.isfinite(cost[k]) or len(found) == EACH or asked == LATER_SPOTS:
@@ -206,6 +214,21 @@ def _roofed(positions: Float[np.ndarray, "n 3"], around: Obstacles, wide: float)
         return np.zeros(0, bool)
     points = positions[:, None] + np.stack([np.zeros(len(COLUMN)), np.zeros(len(COLUMN)), COLUMN], axis=1)
     return np.any(around.distance(points) < wide, axis=1)
+
+
+def _drawers(world: PlannedWorld, name: str) -> list[OpenableJoint]:
+    found = openable_joints(world.stage.scene, world.view, world.index(name), world.world)
+    return [joint for joint in found if not joint.hinge]
+
+
+def _shut_away(positions: Float[np.ndarray, "n 3"], drawers: Sequence[OpenableJoint]) -> Bool[np.ndarray, "n"]:
+    """Which positions are in a drawer that is shut, or behind one that is pulled out, where it is to be shut."""
+    out, shut = np.zeros(len(positions), bool), np.zeros(len(positions), bool)
+    for drawer in drawers:
+        for found, corners in ((out, drawer.vertices), (shut, drawer.shut)):
+            if found is shut or drawer.fraction > AJAR:
+                found |= ((corners.min(0) <= positions) & (positions <= corners.max(0))).all(1)
+    return shut & ~out
 
 
 def _out_of_reach(world: PlannedWorld) -> Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n"]]:

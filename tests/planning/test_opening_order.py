@@ -1,0 +1,93 @@
+"""Which doors and drawers of a container are moved, in which order, until there is a way for a hand."""
+
+import dataclasses
+import types
+
+import numpy as np
+import pytest
+
+from ig2mj.planning import opening
+from ig2mj.planning.joints import OPEN_TO, OpenableJoint
+from ig2mj.planning.opening import Tried, open_around, open_into
+from ig2mj.planning.spots import _shut_away
+
+OUT = np.array([0.0, -1.0, 0.0])
+
+
+def _box(low, high):
+    return np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+
+
+def _drawer(name, bottom, fraction=0.0):
+    """A drawer 0.5 m wide and deep, 0.2 m high, that slides out to -y."""
+    corners = _box((0.0, 0.0, bottom), (0.5, 0.5, bottom + 0.2)) + 0.4 * fraction * OUT
+    return OpenableJoint(name, "cabinet", 0, False, np.zeros(3), OUT, 0.4 * fraction, 0.0, 0.4, corners, ())
+
+
+def _door(fraction=0.0):
+    corners = _box((0.0, -0.02, 0.0), (0.5, 0.0, 1.0))
+    return OpenableJoint("door", "cabinet", 0, True, np.zeros(3), -OUT, 1.6 * fraction, 0.0, 1.6, corners, ())
+
+
+@pytest.fixture
+def moved(monkeypatch):
+    """Joints of a container in place of a world's; each that is moved is noted, and gets to where it was to be."""
+    noted = []
+
+    def container(*joints):
+        now = {joint.name: joint for joint in joints}
+
+        def move_joint(world, joint, hand, value, tried=0, to=OPEN_TO):
+            yield from ()
+            noted.append((joint.name, to if value else 0.0))
+            fraction = noted[-1][1]
+            corners = joint.vertices if joint.hinge else joint.shut + 0.4 * fraction * OUT
+            now[joint.name] = dataclasses.replace(joint, now=fraction * joint.open, vertices=corners)
+            return "", ""
+
+        monkeypatch.setattr(opening, "joints_of", lambda world, name: list(now.values()))
+        monkeypatch.setattr(opening, "move_joint", move_joint)
+        monkeypatch.setattr(opening, "free_hand", lambda world, attempt: 0)
+        domain = types.SimpleNamespace(opens=lambda name: True, openable=())
+        facts = types.SimpleNamespace(containers=lambda name: ["cabinet"])
+        com = np.array([0.25, 0.25, 0.5])
+        return types.SimpleNamespace(
+            held=["plate", ""],
+            domain=domain,
+            facts=facts,
+            com=lambda name: com,
+            body=types.SimpleNamespace(opening=None),
+        )
+
+    return container, noted
+
+
+def _all(generator):
+    """The result of a generator that yields nothing."""
+    with pytest.raises(StopIteration) as end:
+        next(generator)
+    return end.value.value
+
+
+def test_a_full_drawer_is_shut_before_the_one_below_it_is_opened(moved):
+    container, noted = moved
+    world = container(_drawer("top", 0.6, OPEN_TO), _drawer("middle", 0.4), _drawer("bottom", 0.2))
+    tried = Tried()
+    for _ in range(4):
+        assert _all(open_into(world, "cabinet", tried))
+    assert noted == [("top", 0.0), ("middle", OPEN_TO), ("middle", 0.0), ("bottom", OPEN_TO)]
+    assert not _all(open_into(world, "cabinet", tried))
+
+
+def test_doors_are_opened_to_their_ends_at_last(moved):
+    container, noted = moved
+    world, tried = container(_door(0.3)), Tried()
+    while _all(open_around(world, "plate", tried)):
+        pass
+    assert noted == [("door", OPEN_TO), ("door", 1.0)]
+
+
+def test_nothing_is_put_behind_drawers_that_are_pulled_out_or_into_shut_ones():
+    drawers = [_drawer("top", 0.6, 0.9), _drawer("bottom", 0.4)]
+    positions = np.array([[0.25, 0.45, 0.65], [0.25, -0.1, 0.65], [0.25, 0.45, 0.45], [0.25, 0.45, 0.1]])
+    assert _shut_away(positions, drawers).tolist() == [True, False, True, False]
