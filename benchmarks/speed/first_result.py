@@ -12,7 +12,7 @@ has the seconds from the process's start to the first result of each run, and to
   second iteration.
 - `evaluate`: the end of an evaluation of the shipped policy CookingMeat with as many episodes as worlds (1,000).
 
-`--colds N` repeats the cold run, each time with an empty folder.
+`--colds N` repeats the cold run, each time with an empty folder. `--words --set programs=2` adds words to the command.
 """
 
 from __future__ import annotations
@@ -46,6 +46,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--colds", type=int, default=1, help="cold runs")
     parser.add_argument("--times", type=int, default=3, help="warm runs")
     parser.add_argument("--rows", type=pathlib.Path, help="file for the rows; default: they are printed")
+    parser.add_argument("--words", nargs=argparse.REMAINDER, default=[], help="last: further words of each command")
     args = parser.parse_args(argv)
     if args.cache.exists():
         raise SystemExit(f"error: {args.cache} exists, so this would be no cold start; name another folder")
@@ -53,12 +54,12 @@ def main(argv: Sequence[str] | None = None) -> None:
         cold = []
         for _ in range(args.colds):
             shutil.rmtree(args.cache, ignore_errors=True)
-            cold.append(_run(name, args.cache))
-        warm = [_run(name, args.cache) for _ in range(args.times)]
+            cold.append(_run(name, args.cache, args.words))
+        warm = [_run(name, args.cache, args.words) for _ in range(args.times)]
         row = {
             "benchmark": "first_result",
             "what": name,
-            "run": ["ig2mj", *COMMANDS[name]],
+            "run": ["ig2mj", *COMMANDS[name], *args.words],
             **provenance(),
             "device": _device(),
         }
@@ -69,18 +70,19 @@ def main(argv: Sequence[str] | None = None) -> None:
         keep_row(row | machine(-1), args.rows)
 
 
-def _run(name: str, cache: pathlib.Path) -> tuple[float, float]:
+def _run(name: str, cache: pathlib.Path, words: Sequence[str]) -> tuple[float, float]:
     """Seconds to the first result, and to the end of the process."""
     out = cache / "run"
     shutil.rmtree(out, ignore_errors=True)
     env = environment(IG2MJ_CACHE_DIR=str(cache.resolve()), CUDA_CACHE_PATH=str((cache / "cuda").resolve()))
     for elsewhere in ("JAX_COMPILATION_CACHE_DIR", "WARP_CACHE_PATH"):
         env.pop(elsewhere, None)
-    words = [sys.executable, "-m", "ig2mj", *COMMANDS[name], *(["--out", str(out)] if name == "train" else [])]
+    where = ["--out", str(out)] if name == "train" else []
+    command = [sys.executable, "-m", "ig2mj", *COMMANDS[name], *where, *words]
     log = pathlib.Path(f"{cache}.log")
     began = time.monotonic()
     with log.open("w") as said:
-        process = subprocess.Popen(words, env=env, stdout=said, stderr=said)
+        process = subprocess.Popen(command, env=env, stdout=said, stderr=said)
         first = None
         while process.poll() is None:
             now = time.monotonic() - began
@@ -91,7 +93,7 @@ def _run(name: str, cache: pathlib.Path) -> tuple[float, float]:
             time.sleep(0.01)
     whole = time.monotonic() - began
     if process.returncode:
-        raise SystemExit(f"error: {' '.join(words)} ended with {process.returncode}:\n{log.read_text()[-2000:]}")
+        raise SystemExit(f"error: {' '.join(command)} ended with {process.returncode}:\n{log.read_text()[-2000:]}")
     return first if first is not None else whole, whole
 
 

@@ -8,6 +8,10 @@ import sys
 
 import pytest
 
+from ig2mj.cli.train import _on_one_device
+from ig2mj.learn.run_files import run_table
+from ig2mj.process import imports
+
 
 def imported(code: str) -> set[str]:
     shown = "import sys; print(*sys.modules)"
@@ -80,3 +84,33 @@ jax.devices()
     }
     assert done["cpu"].returncode == 0 and done["none"].returncode != 0
     assert "in thread" not in done["none"].stderr.lower() and "RuntimeError" in done["none"].stderr
+
+
+def test_devices_are_looked_for_before_imports_only_where_jax_will_use_a_gpu(monkeypatch, tmp_path):
+    looked = []
+    monkeypatch.setattr(imports, "find_devices", lambda: looked.append(1))
+    assert not imports.find_gpu({}, tmp_path)
+    (tmp_path / "nvidiactl").touch()
+    assert not imports.find_gpu({}, tmp_path)
+    (tmp_path / "nvidia0").touch()
+    for hidden in ({"JAX_PLATFORMS": "cpu"}, {"CUDA_VISIBLE_DEVICES": ""}, {"CUDA_VISIBLE_DEVICES": "-1"}):
+        assert not imports.find_gpu(hidden, tmp_path)
+    assert not looked
+    for seen in ({}, {"JAX_PLATFORMS": "cuda,cpu"}, {"CUDA_VISIBLE_DEVICES": "1"}):
+        assert imports.find_gpu(seen, tmp_path)
+    assert len(looked) == 3
+
+
+def test_a_training_looks_for_them_early_where_no_option_of_xla_is_set_later():
+    one = run_table("CookingMeat")
+    assert _on_one_device(one, (), None, {}) and _on_one_device({}, ("image_size=64",), "1", {})
+    assert not _on_one_device(run_table("CookingMeat-homes"), (), None, {})
+    for changes in (("programs=2",), ("homes=train",), ("engine=native",)):
+        assert not _on_one_device(one, changes, None, {})
+    assert not _on_one_device(one, (), "all", {}) and not _on_one_device({**one, "devices": "2"}, (), None, {})
+    slurm = {"SLURM_STEP_NODELIST": "a[1-2]", "SLURM_NTASKS": "2", "SLURM_JOB_ID": "1", "SLURM_PROCID": "0"}
+    assert not _on_one_device(one, (), None, slurm)
+
+
+def test_what_a_run_file_says_is_read_without_jax():
+    assert "jax" not in imported("from ig2mj.learn.run_files import run_table; run_table('CookingMeat')")

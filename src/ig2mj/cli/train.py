@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -91,6 +92,14 @@ def run(
         process of low priority makes them; they need OpenGL and ffmpeg.
       object: {object}.
     """
+    import os
+
+    from ig2mj.learn.run_files import run_table
+    from ig2mj.process.imports import find_gpu
+
+    if _on_one_device({} if config is None else run_table(config), set, devices, os.environ):
+        find_gpu(os.environ)  # while the rest is imported
+
     from ig2mj.learn.algorithms import check_settings
     from ig2mj.learn.run_config import RunOptions, read_run_file, settings_of
 
@@ -110,6 +119,19 @@ def run(
         return train_from_demos(chosen, out, resume, found, config_of_algorithm)
     check_settings(config_of_algorithm, occlusion)
     return _train(chosen, out, resume, changes)
+
+
+def _on_one_device(
+    table: Mapping[str, Any], changes: tuple[str, ...], devices: str | None, environ: Mapping[str, str]
+) -> bool:
+    """Whether a run is on one device of this process and needs no option of XLA that is set later (`_train`), as far as
+    its file and the command say; both are checked later."""
+    from ig2mj.cluster.process_topology import find_topology
+
+    said = {str(name): str(value) for name, value in table.get("settings", {}).items()}
+    said |= {name: value for name, _, value in (change.partition("=") for change in changes)}
+    several = str(devices or table.get("devices", "1")) != "1" or find_topology(environ) is not None
+    return not several and said.get("engine") != "native" and not {"homes", "programs"} & said.keys()
 
 
 def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: tuple[str, ...]) -> int:

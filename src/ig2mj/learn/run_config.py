@@ -20,7 +20,6 @@ import dataclasses
 import json
 import os
 import pathlib
-import tomllib
 from typing import Any
 
 import msgspec
@@ -30,8 +29,9 @@ from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
 from ig2mj.learn.algorithms import config_of
 from ig2mj.learn.bc import BCConfig
 from ig2mj.learn.occlusion import OcclusionConfig
+from ig2mj.learn.run_files import FIX, run_table, shipped_runs
 from ig2mj.learn.settings import configure_all, written
-from ig2mj.learn.shipped import CHECKOUT, INSTALLED, find_policy
+from ig2mj.learn.shipped import find_policy
 from ig2mj.scene.paths import shipped_homes
 from ig2mj.scene.scene import check_looks
 from ig2mj.sensors.base import CAMERA_LOOKS
@@ -66,8 +66,6 @@ class RunOptions:
 
 
 ALGORITHMS = ("sac", "ppo", "bc", "dagger")
-
-_FIX = "policies/CookingMeat.toml of the project is such a file"
 
 
 def _axes(text: str) -> Randomize | None:
@@ -167,24 +165,11 @@ def read_run_file(file: str | os.PathLike) -> tuple[dict[str, Any], tuple[str, .
     Raises:
       InputError: no such file, no TOML, or a value of another type. UnknownNameError: an option that does not exist.
     """
-    path = pathlib.Path(file)
-    if not path.exists() and len(path.parts) == 1:
-        known = shipped_runs()
-        path = known.get(path.stem, path)
-        if not path.suffix:
-            raise UnknownNameError("training file", path.name, known)
-    try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as e:
-        raise InputError(file, "there is no such file", fix=_FIX) from e
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as e:
-        raise InputError(file, f"is not TOML ({e})", fix=_FIX) from e
-    settings = found.pop("settings", {})
-    if not isinstance(settings, dict):
-        raise InputError(file, "is not a table", element="settings", fix=_FIX)
+    found = run_table(file)
+    settings = found.pop("settings")
     for name, value in settings.items():
         if not isinstance(value, str | int | float | list) or any(isinstance(v, dict | list) for v in _items(value)):
-            raise InputError(file, f"has a value of type {type(value).__name__}", element=f"settings.{name}", fix=_FIX)
+            raise InputError(file, f"has a value of type {type(value).__name__}", element=f"settings.{name}", fix=FIX)
     known = {field.name for field in dataclasses.fields(RunOptions)}
     for name in found:
         if name not in known:
@@ -192,14 +177,8 @@ def read_run_file(file: str | os.PathLike) -> tuple[dict[str, Any], tuple[str, .
     try:
         options = msgspec.convert(found, RunOptions)
     except msgspec.ValidationError as e:
-        raise InputError(file, str(e), fix=_FIX) from e
+        raise InputError(file, str(e), fix=FIX) from e
     return {name: getattr(options, name) for name in found}, tuple(f"{n}={written(v)}" for n, v in settings.items())
-
-
-def shipped_runs() -> dict[str, pathlib.Path]:
-    """Files of the runs that the policies that ship come from, by name."""
-    folders = [folder for folder in (INSTALLED, CHECKOUT) if folder.is_dir()]
-    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.toml"))}
 
 
 def initial_policy(name: str) -> pathlib.Path:

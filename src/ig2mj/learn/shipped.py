@@ -18,11 +18,8 @@ from ig2mj.envs.names import NAMESPACE, VERSION
 from ig2mj.envs.registry import find_task
 from ig2mj.errors import InputError, UnknownNameError
 from ig2mj.learn.policies import Policy, looks_of
+from ig2mj.learn.run_files import CHECKOUT, INSTALLED
 from ig2mj.tasks.task import Task
-
-_HERE = pathlib.Path(__file__).resolve()
-
-CHECKOUT, INSTALLED = _HERE.parents[3] / "policies", _HERE.parents[2] / "ig2mj_policies"
 
 MOST_BYTES, MOST_BYTES_OF_ALL = 700_000, 12_000_000
 """Sizes that a policy's file, and all of them together, may have."""
