@@ -84,8 +84,14 @@ def run(
     """
     import contextlib
     import json as form
+    import os
     import sys
     import time
+
+    from ig2mj.process.imports import find_gpu
+
+    if engine != "native" and jobs == 1 and cluster is None:
+        find_gpu(os.environ)  # while the rest is imported
 
     import jax
 
