@@ -96,6 +96,16 @@ def test_one_hand_puts_down_its_tool_before_it_takes_something_else(sampler, dir
     assert steps.index("release knife") < steps.index("grasp sponge") < steps.index("release sponge")
 
 
+@pytest.mark.parametrize("hands", [1, 2])
+def test_the_only_hand_puts_down_a_tool_to_turn_a_tap_on(sampler, dirty, hands):
+    planner = planner_of(sampler.model, "(not (stained pan))", hands)
+    facts = SymbolicRung(planner.domain, sampler, [dirty]).facts(0)
+    facts.held = ["sponge"]
+    steps = [str(step) for step in planner.plan(facts).steps]
+    soaks = ["toggle_on sink", "soak sponge sink", "scrub pan sponge"]
+    assert steps == (soaks if hands == 2 else ["release sponge", soaks[0], "grasp sponge", *soaks[1:]])
+
+
 def test_what_failed_in_the_present_world_comes_after_the_rest(sampler, start):
     planner = planner_of(sampler.model, "(and (inside apple cabinet) (inside ball cabinet))")
     facts = SymbolicRung(planner.domain, sampler, [start]).facts(0)

@@ -24,7 +24,7 @@ from ig2mj.planning.cleaning_strokes import (
     turn_about,
 )
 from ig2mj.planning.driving import go
-from ig2mj.planning.grasping import grasp, put_down_others
+from ig2mj.planning.grasping import grasp, held_again, put_down_others, set_aside
 from ig2mj.planning.handing_over import hand_over
 from ig2mj.planning.moves import (
     UP,
@@ -38,7 +38,7 @@ from ig2mj.planning.moves import (
     travel,
     vector3,
 )
-from ig2mj.planning.opening import Tried, open_around
+from ig2mj.planning.opening import Tried, bars, open_around
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.placing import bring_out
 from ig2mj.planning.steps import Outcome, Step
@@ -93,7 +93,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             spots = [spot for spot in world.dirt(predicate, name) if tried[spot.number] < TRIES]
             spots.sort(key=lambda spot: tried[spot.number])
             plan = plan_strokes(world, name, tool, hand, spots, visited)
-            while plan is None and (yield from open_around(world, name, opened)):
+            while plan is None and (yield from _opened(world, name, tool, opened)) and tool in world.held:
                 plan = plan_strokes(world, name, tool, hand, spots, visited)
             while plan is None and (yield from _clear_away(world, name, tool, spots, moved)) and tool in world.held:
                 plan = plan_strokes(world, name, tool, hand, spots, ())
@@ -132,6 +132,16 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
     return clean
 
 
+def _opened(world: PlannedWorld, name: str, tool: str, opened: Tried) -> Generator[Program, str, bool]:
+    """As `open_around`; where the only hand holds the tool, that is put down for it."""
+    if not bars(world, name, opened):
+        return False
+    yield from put_down_others(world, tool)
+    aside = yield from set_aside(world)
+    moved = yield from open_around(world, name, opened)
+    return not aside or ((yield from held_again(world, tool)) and moved)
+
+
 def _clear_away(
     world: PlannedWorld, name: str, tool: str, spots: Sequence[DirtSpot], moved: set[str]
 ) -> Generator[Program, str, bool]:
@@ -153,8 +163,9 @@ def _clear_away(
     other = min(near)[1]
     moved.add(other)
     yield from put_down_others(world, tool)
+    aside = yield from set_aside(world)
     yield from bring_out(world, other)
-    return True
+    return not aside or (yield from held_again(world, tool))
 
 
 def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Program:

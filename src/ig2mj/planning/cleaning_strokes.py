@@ -42,6 +42,10 @@ BACKWARDS, ARM_TURNS = -0.2, 6
 """Cosine of the angle between where a gripper on an arm points and where it likes to, below which it does not clean;
 and turns of its tool that are tried at most."""
 
+FLAT, FLAT_TURNS = 0.3, 4
+"""Times its width that a tool is thick at most which is pressed on faces with its flat side, and turns about a face's
+normal in which a gripper does so, of those that are tried."""
+
 TILTS = (-0.8, 0.8)
 """rad about an axis in a face by which a tool is tilted."""
 
@@ -65,6 +69,9 @@ OPEN, ROOM, HIDDEN, HIDDEN_WORTH = np.array([0.12, 0.2, 0.3]), 0.06, 2, 0.25
 something has to cover more than others to be chosen, and what these count."""
 
 EAST = np.array([1.0, 0.0, 0.0])
+
+ASKED = 3
+"""Particles of which it is asked whether an arm brings a tool to them, for each turn of the tool."""
 
 ELSEWHERE = 0.12
 """m between stances from which an object is cleaned."""
@@ -129,7 +136,13 @@ class Region:
 
 
 class HeldTool:
-    """A tool as a hand holds it now: the part that cleans, and spheres of hand and tool, m from the grasp point."""
+    """A tool as a hand holds it now: the part that cleans, and spheres of hand and tool, m from the grasp point.
+
+    Attributes:
+      flat: the direction that the flat side of a tool faces which cleans with all of it; None: it has none.
+    """
+
+    flat: Vector | None = None
 
     def __init__(self, world: PlannedWorld, tool: str, hand: int):
         self.world, self.tool, self.hand = world, tool, hand
@@ -138,10 +151,25 @@ class HeldTool:
         self.whole = world.vertices(tool) - world.grip(hand)
         self.corners = self.whole if area is None else area - world.grip(hand)
         self._spheres = world.spheres(*world.hand_axes(hand), holding=tool, hand=hand)
+        self.flat = None if self.has_area else _flat_side(self.whole)
 
     def spheres(self, rotation: Rotation) -> Float[np.ndarray, "S 4"]:
         """Of hand and tool, if they were turned."""
         return np.concatenate([self._spheres[:, :3] @ rotation.T, self._spheres[:, 3:]], axis=1)
+
+
+def _flat_side(corners: Float[np.ndarray, "n 3"]) -> Vector | None:
+    """The direction that the flat side of a tool faces which is away from the hand; None: it has no flat side.
+
+    Args:
+      corners: m from the hand's grasp point.
+    """
+    middle = corners.mean(0)
+    axes = np.linalg.svd(corners - middle, full_matrices=False)[2]
+    wide, thin = (float(np.ptp(corners @ axis)) for axis in axes[1:])
+    if thin > FLAT * wide:
+        return None
+    return axes[2] if float(middle @ axes[2]) >= 0.0 else -axes[2]
 
 
 def regions_of(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
@@ -176,14 +204,20 @@ def _turned_regions(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
 
 def _of_arm(held: HeldTool, yaw: float, normal: Vector, facing: Rotation, carried: Rotation) -> list[Rotation]:
     """Turns of a tool on an arm: about the normal, and of one that cleans with all of it also with the gripper towards
-    the face; those first in which the gripper points about where it likes to."""
+    the face, and before these with its flat side on the face; those first in which the gripper points about where it
+    likes to."""
     _, palm = held.world.hand_axes(held.hand)
-    bases = [facing] if held.has_area else [facing, turn_onto(carried @ palm, -normal) @ carried]
-    found = [turn_about(normal, k * np.pi / 4) @ base for base in bases for k in range(8)] + [carried]
     aim = OBLIQUE[0] * ahead(yaw) - OBLIQUE[1] * UP
-    score = [round(float(r @ palm @ aim), 1) for r in found]
-    order = sorted(range(len(found)), key=lambda k: -score[k])
-    return [found[k] for k in order if score[k] > BACKWARDS][:ARM_TURNS] or [facing]
+
+    def turned(bases: Sequence[Rotation]) -> list[Rotation]:
+        found = [turn_about(normal, k * np.pi / 4) @ base for base in bases for k in range(8)]
+        score = [round(float(r @ palm @ aim), 1) for r in found]
+        order = sorted(range(len(found)), key=lambda k: -score[k])
+        return [found[k] for k in order if score[k] > BACKWARDS]
+
+    flat = [] if held.flat is None else turned([turn_onto(carried @ held.flat, -normal) @ carried])[:FLAT_TURNS]
+    bases = [facing] if held.has_area else [facing, turn_onto(carried @ palm, -normal) @ carried]
+    return [*flat, *turned(bases)][:ARM_TURNS] or [facing]
 
 
 def aside(yaw: float) -> Vector:
@@ -242,7 +276,8 @@ def plan_strokes(
     """The stance from which most particles are in reach, of those near the nearest ones that were not visited."""
     floor, obstacles = world.floor(), world.obstacles([tool], stays=False)
     spots = [s for s in spots if s.normal[2] > LOWEST]
-    away = world.away(world.spheres(*world.hand_axes(hand), holding=tool, hand=hand))
+    axes = world.hand_axes(hand)
+    away = world.away(world.spheres(*axes, holding=tool, hand=hand), axes[1])
     held, loose = HeldTool(world, tool, hand), not world.domain.fixed(name)
     best: StrokePlan | None = None
     seen = [*visited]
@@ -343,28 +378,36 @@ class _From:
                 room = left & (np.linalg.norm(at - shoulder, axis=1) <= self._world.body.reach)
                 rows = np.flatnonzero(room)
                 room[rows] = self._obstacles.clear_at(spheres, at[rows] + region.lifted * normal[rows])
-                if (
-                    self._world.body.opening is not None
-                    and room.any()
-                    and not self._arm_reaches(spots, members, room, turn)
-                ):
-                    continue
+                if self._world.body.opening is not None and room.any():
+                    room = self._reached(spots, members, room, turn, np.linalg.norm(at - shoulder, axis=1))
                 for row in np.flatnonzero(room & ~to_robot):
                     room[row] = bool(self.way(spots[members[row]], turn))
                 found[np.array(members)[room]] = turn
                 left &= ~room
         return found
 
-    def _arm_reaches(
-        self, spots: Sequence[DirtSpot], members: Sequence[int], room: Bool[np.ndarray, "n"], turn: int
-    ) -> bool:
-        """Whether an arm brings the tool, turned so, to above the middle one of some particles with room."""
-        rows = np.flatnonzero(room)
-        spot = spots[members[rows[len(rows) // 2]]]
-        region, _ = self._turned(spot.normal)[turn]
-        quat = self._world.turned_hand(self._hand, region.rotation)
+    def _reached(
+        self,
+        spots: Sequence[DirtSpot],
+        members: Sequence[int],
+        room: Bool[np.ndarray, "n"],
+        turn: int,
+        far: Float[np.ndarray, "n"],
+    ) -> Bool[np.ndarray, "n"]:
+        """Above which of some particles with room an arm brings the tool, turned so; `ASKED` of them are looked at.
+
+        Args:
+          far: m from the shoulder to the grasp point at each.
+        """
+        rows, reached = np.flatnonzero(room), np.zeros(len(room), bool)
+        rows = rows[np.argsort(far[rows], kind="stable")]
+        quat = self._world.turned_hand(self._hand, self._turned(spots[members[rows[0]]].normal)[turn][0].rotation)
         follows = self._world.follows(self._hand, quat, self._obstacles, self._stance)
-        return follows is None or follows.reaches(region.above(spot))
+        for row in rows[np.unique(np.linspace(0, len(rows) - 1, ASKED).astype(int))]:
+            spot = spots[members[row]]
+            region, _ = self._turned(spot.normal)[turn]
+            reached[row] = follows is None or follows.reaches(region.above(spot))
+        return reached
 
     def way(self, spot: DirtSpot, turn: int) -> list[Vector] | None:
         """The hand's way to above a particle; None: there is none."""

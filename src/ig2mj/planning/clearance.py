@@ -138,6 +138,8 @@ class Obstacles:
 
     def distance(self, points: Float[np.ndarray, "*M 3"]) -> Float[np.ndarray, "*M"]:
         """m from points to the nearest piece, at most `FAR`; negative inside."""
+        if not points.size:
+            return np.zeros(points.shape[:-1])
         every = points.reshape(-1, 3)
         low, high = every.min(0) - FAR, every.max(0) + FAR
         near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))

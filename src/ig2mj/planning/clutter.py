@@ -12,6 +12,7 @@ from jaxtyping import Float
 from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.footprint import LOWEST
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor, Point
+from ig2mj.planning.grasping import held_again, set_aside
 from ig2mj.planning.moves import PrimitiveFailed, Program
 from ig2mj.planning.placing import bring_out
 from ig2mj.planning.pushing import push_aside
@@ -36,12 +37,19 @@ NEAR_WAY, HIGH = 0.3, 1.05
 def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, str, bool]:
     """Puts the first thing that is in the way elsewhere on the floor, or pushes it aside; returns whether there was
     one, and it was."""
-    if all(world.held) or not isinstance(world.body, HandedBody):
+    if not isinstance(world.body, HandedBody):
         return False
     name = clutter_in_the_way(world, step)
     name = lying_upon(world, step) if name is None else name
     if name is None:
         return False
+    aside = yield from set_aside(world)
+    moved = yield from _moved(world, step, name)
+    return moved and (not aside or (yield from held_again(world, aside)))
+
+
+def _moved(world: PlannedWorld, step: Step, name: str) -> Generator[Program, str, bool]:
+    """Puts a thing elsewhere, or pushes it aside; returns whether it did."""
     try:
         if world.domain.graspable(name):
             return (yield from bring_out(world, name)).done

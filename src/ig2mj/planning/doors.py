@@ -11,6 +11,7 @@ import numpy as np
 from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.clutter import moved_out_of_the_way, nearest_floor, target_of
 from ig2mj.planning.driving import NEAR
+from ig2mj.planning.grasping import held_again, set_aside
 from ig2mj.planning.moves import Primitive, Program, free_hand
 from ig2mj.planning.occupancy import door_objects
 from ig2mj.planning.opening import joints_of, move_joint
@@ -53,8 +54,11 @@ def _through_doors(world: PlannedWorld, step: Step, action: Action) -> Primitive
                 return outcome
             outcome = yield from action(world, step)
             continue
+        aside = (yield from set_aside(world)) if isinstance(world.body, HandedBody) else ""
         if (detail := (yield from _swing(world, door, step))) is not None:
             return dataclasses.replace(outcome, reason="no_path", detail=f"{door} is shut in the way{detail}")
+        if aside and not (yield from held_again(world, aside)):
+            return dataclasses.replace(outcome, reason="slipped", detail=f"{aside} was put down to open {door}")
         outcome = yield from action(world, step)
     return outcome
 
@@ -64,8 +68,6 @@ def _swing(world: PlannedWorld, door: str, step: Step) -> Generator[Program, str
     in words; "" for a robot that opens no doors."""
     if not isinstance(world.body, HandedBody):
         return ""
-    if all(world.held):
-        return f", and the hands are full: {', '.join(world.held)}"
     tried = 0
     for attempt in range(SWINGS):
         shut = [j for j in joints_of(world, door) if j.fraction < WIDE]

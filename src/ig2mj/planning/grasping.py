@@ -15,7 +15,6 @@ from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.grasps import GraspPose, grasp_poses, ordered
 from ig2mj.planning.moves import (
     ATTEMPTS,
-    BELOW,
     OPENS,
     RETREAT,
     UP,
@@ -129,6 +128,16 @@ def held_again(world: PlannedWorld, name: str) -> Generator[Program, str, bool]:
     return (yield from grasp(world, Step("grasp", (name,)))).done
 
 
+def set_aside(world: PlannedWorld) -> Generator[Program, str, str]:
+    """Where no hand is free, puts down what one holds where the robot stands: the caller takes it again
+    (`held_again`). Returns its name; "": a hand is free already."""
+    if not all(world.held):
+        return ""
+    name = world.held[0]
+    yield from release(world, Step("release", (name,)))
+    return name
+
+
 def _off_furniture(world: PlannedWorld) -> Generator[Program, str, None]:
     """Hands let go of doors and drawers: one that ran into a drawer has lost what it held, and closed on that."""
     for hand, name in enumerate(world.held):
@@ -173,7 +182,7 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     lift = LIFT * UP * float(pose.palm @ UP > -0.9)
     reason = yield [
         *closing_on(world, name, hand, pose, way),
-        *([Phase(hand=hand, pos=vector3(pose.at(-BELOW)), close=True, until=Until.WAITED, limit=FIRM)]
+        *([Phase(hand=hand, pos=vector3(pose.at(-pose.deep)), close=True, until=Until.WAITED, limit=FIRM)]
           if world.body.friction else []),
         *([Phase(hand=hand, pos=vector3(pose.at(0.0) + lift), keeps=index, close=True, tolerance=0.02, limit=10,
                  after="", speed=0.03)] if lift.any() else []),

@@ -12,10 +12,12 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.moves import BELOW
+from ig2mj.planning.pinches import SHALLOW, between_fingers, holds, over_edges
 from ig2mj.planning.world import PlannedWorld, Vector
 from ig2mj.scene.tables import SceneTables
 
@@ -40,9 +42,18 @@ AT_OBJECT = 0.4
 OBLIQUE = (0.9, 0.44)
 """Ahead and down: where a gripper on an arm likes to point, a unit vector."""
 
-BITE, SPARE_OPENING, SLICES = 0.02, 0.012, 25
-"""m beyond a surface at which the width of an object is looked at, m that open fingers are wider than it, and points
-between the fingers that are looked at."""
+RAISED = 0.028
+"""m by which a gripper is raised off a surface at most where its fingers would enter what a thin object lies on: they
+are long enough to hold it with their tips."""
+
+TIPS = 0.01
+"""m beyond a grasp point that a gripper goes for which holds an object with the tips of its fingers."""
+
+LEVEL = 0.3
+"""Vertical part of the direction between fingers up to which they are about level."""
+
+EDGE = 0.3
+"""Discomfort of a gripper that holds with its fingertips: what fits between its fingers is held better."""
 
 GRAZE, SCRAPE = 0.025, 2.0
 """m by which fingertips may seem to enter what is around the object, which stops them, and discomfort of entering
@@ -85,6 +96,7 @@ class GraspPose:
       burden: how badly the object is held there: far from below its centre of mass, or so low that the hand is in the
         way when it is put down; 0 to 1.
       scrapes: fingers meet what is around the object, unless the object stops the hand before.
+      deep: m beyond the point that the hand goes for, until it touches the object.
     """
 
     point: Vector
@@ -93,6 +105,7 @@ class GraspPose:
     before: float
     burden: float = 0.0
     scrapes: bool = False
+    deep: float = BELOW
 
     def at(self, away: float) -> Vector:
         """A point above the surface, m along its normal."""
@@ -165,15 +178,14 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     if not points:
         return []
     points, fingers, palms = np.array(points), np.array(fingers), np.array(palms)
-    body, which = world.body, np.arange(len(points))
+    body, which, deep = world.body, np.arange(len(points)), np.full(len(points), BELOW)
     if body.opening is not None:
         others = set(range(len(tables.object_names))) - {index}
         own = world.planner.obstacles(world.view, others, world.world)
-        which, points = between_fingers(own, points, fingers, palms, body.opening)
-        fingers, palms = fingers[which], palms[which]
+        which, points, fingers, palms, deep = _of_gripper(body, own, trunk, points, fingers, palms)
     else:
         which, points = _under_fingers(corners, points, fingers, palms)
-        fingers, palms = fingers[which], palms[which]
+        fingers, palms, deep = fingers[which], palms[which], deep[which]
     if not len(points):
         return []
     spheres = np.stack([body.hand_spheres(f, p) for f, p in zip(fingers, palms, strict=True)])
@@ -188,10 +200,13 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     burden = np.minimum(lever / MOST_TORQUE, 1.0) + low
     good = np.flatnonzero(before > 0)
     scrapes = ~_fingers_have_room(body, obstacles, points[good], fingers[good], palms[good])
-    good, scrapes = (a[np.lexsort((np.arange(len(good)), scrapes, which[good]))] for a in (good, scrapes))
+    order = np.lexsort((np.arange(len(good)), deep[good] < BELOW, scrapes, which[good]))
+    good, scrapes = good[order], scrapes[order]
     first = np.unique(which[good], return_index=True)[1]  # of poses that differ by where the fingers are
     return [
-        GraspPose(points[k], fingers[k], palms[k], float(before[k]), min(float(burden[k]), 1.0), bool(s))
+        GraspPose(
+            points[k], fingers[k], palms[k], float(before[k]), min(float(burden[k]), 1.0), bool(s), float(deep[k])
+        )
         for k, s in zip(good[first], scrapes[first], strict=True)
     ]
 
@@ -202,6 +217,45 @@ def main_pieces(tables: SceneTables, index: int) -> Int[np.ndarray, "n"]:
     own = tables.piece_object == index
     main = tables.graspable_body[(tables.graspable_object == index) & (tables.graspable_joint < 0)]
     return np.flatnonzero(own & np.isin(tables.piece_body, main) if len(main) else own)
+
+
+def _of_gripper(
+    body: HandedBody,
+    own: Obstacles,
+    corners: Float[np.ndarray, "V 3"],
+    points: Float[np.ndarray, "N 3"],
+    fingers: Float[np.ndarray, "N 3"],
+    palms: Float[np.ndarray, "N 3"],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Poses of a gripper: with the object between the fingers, where the points of its surface are, and raised off
+    them; and over its edges. Number of each that differ only by where the fingers are, points, fingers, palms, and how
+    deep the hand goes.
+
+    Args:
+      own: the object alone. corners: its own.
+    """
+    opening = body.opening
+    assert opening is not None
+    which, at = between_fingers(own, points, fingers, palms, opening)
+    thin = np.setdiff1d(np.arange(len(points)), which)
+    more, shallow = between_fingers(own, points[thin], fingers[thin], palms[thin], opening, SHALLOW)
+    which, at = np.concatenate([which, thin[more]]), np.concatenate([at, shallow])
+    lowest = np.array([body.hand_corners(f, p)[:, 2].min() for f, p in zip(fingers, palms, strict=True)])[which]
+    below = corners[:, 2].min() - (at[:, 2] + lowest)
+    raised = below / np.maximum(-palms[which][:, 2], 1e-6)
+    tips = np.flatnonzero((np.abs(fingers[which][:, 2]) < LEVEL) & (raised > 0.0) & (raised < RAISED))
+    higher = at[tips] - raised[tips, None] * palms[which[tips]]
+    good = holds(body.hand_corners, opening, own, higher, fingers[which[tips]], palms[which[tips]])
+    deep = np.repeat([BELOW, TIPS], [len(which), good.sum()])
+    which, at = np.concatenate([which, which[tips[good]]]), np.concatenate([at, higher[good]])
+    edge, edge_fingers, edge_palms = over_edges(body.hand_corners, opening, own, corners)
+    return (
+        np.concatenate([which, len(points) + np.arange(len(edge))]),
+        np.concatenate([at, edge]),
+        np.concatenate([fingers[which], edge_fingers]),
+        np.concatenate([palms[which], edge_palms]),
+        np.concatenate([deep, np.full(len(edge), TIPS)]),
+    )
 
 
 def _under_fingers(
@@ -246,32 +300,6 @@ def _fingers_have_room(
     return np.all(distance > -GRAZE, axis=1)
 
 
-def between_fingers(
-    own: Obstacles,
-    points: Float[np.ndarray, "N 3"],
-    fingers: Float[np.ndarray, "N 3"],
-    palms: Float[np.ndarray, "N 3"],
-    opening: float,
-) -> tuple[Int[np.ndarray, "M"], Float[np.ndarray, "M 3"]]:
-    """Poses with the object between the fingers of a gripper: numbers of those from which they come, and points with
-    the object in the middle, and near the one finger and the other, as what lies flat has to be. Poses in which the
-    object is too wide, or misses the fingers, have none.
-
-    Args:
-      own: the object alone. opening: m between the fingers.
-    """
-    along = np.linspace(-opening / 2, opening / 2, SLICES)
-    at = (points + BITE * palms)[:, None] + along[:, None] * fingers[:, None]
-    inside = own.distance(at) < 0.0
-    low = np.where(inside, along, opening).min(1)
-    high = np.where(inside, along, -opening).max(1)
-    fits = np.flatnonzero((high >= low) & (high - low <= opening - 2 * SPARE_OPENING))
-    middle, aside = (low + high)[fits] / 2, (opening - (high - low)[fits]) / 2 - SPARE_OPENING
-    shifts = middle[:, None] + aside[:, None] * np.array([0.0, 1.0, -1.0])
-    moved = points[fits, None] + shifts[..., None] * fingers[fits, None]
-    return np.repeat(fits, 3), moved.reshape(-1, 3)
-
-
 def _room(
     obstacles: Obstacles, centres: Float[np.ndarray, "N S 3"], radii: Float[np.ndarray, "N S"]
 ) -> Bool[np.ndarray, "N"]:
@@ -284,6 +312,7 @@ def ordered(poses: Sequence[GraspPose], yaw: float, on_arm: bool = False) -> lis
 
     def cost(pose: GraspPose) -> float:
         narrow = NARROW * (float(pose.before < BEFORE[0]) + float(pose.before < BEFORE[-1]))
-        return pose.discomfort(yaw, on_arm) + narrow + BURDEN * pose.burden + SCRAPE * pose.scrapes
+        tips = EDGE * (pose.deep < BELOW)
+        return pose.discomfort(yaw, on_arm) + narrow + BURDEN * pose.burden + SCRAPE * pose.scrapes + tips
 
     return sorted(poses, key=cost)

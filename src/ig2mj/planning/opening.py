@@ -12,7 +12,7 @@ import numpy as np
 
 from ig2mj.planning.clearance import Obstacles, hand_way
 from ig2mj.planning.driving import go
-from ig2mj.planning.grasps import AT_OBJECT, between_fingers
+from ig2mj.planning.grasps import AT_OBJECT
 from ig2mj.planning.joints import AJAR, OPEN_TO, FaceGrip, OpenableJoint, openable_joints
 from ig2mj.planning.moves import (
     ABOVE,
@@ -35,6 +35,7 @@ from ig2mj.planning.moves import (
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.pinches import between_fingers
 from ig2mj.planning.stances import reaching_all, stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import PlannedWorld, Stance, Vector
@@ -133,7 +134,27 @@ Tried = collections.Counter[str]
 def open_around(world: PlannedWorld, name: str, tried: Tried) -> Generator[Program, str, bool]:
     """Opens the drawer that an object is in, else doors in front of it, the nearest first; shuts drawers above one that
     it is in, first for hands that float, and where all are open, drawers that it is not in. Returns whether there was
-    one that has not been tried `TRIES` times."""
+    one that has not been tried `TRIES` times, and a free hand."""
+    return (yield from _move(world, _in_front(world, name, tried), tried))
+
+
+def bars(world: PlannedWorld, name: str, tried: Tried) -> bool:
+    """Whether there is a joint that `open_around` would move with a free hand."""
+    return _in_front(world, name, tried) is not None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Move:
+    """A joint, whether it is opened, else it is shut, to which share of its range, and the name under which tries of
+    this are counted."""
+
+    joint: OpenableJoint
+    opens: bool
+    to: float
+    key: str
+
+
+def _in_front(world: PlannedWorld, name: str, tried: Tried) -> _Move | None:
     near, facts = world.com(name), world.facts
     containers = [c for c in facts.containers(name) if world.domain.opens(c)]
     found = [j for c in containers for j in joints_of(world, c)]
@@ -148,43 +169,55 @@ def open_around(world: PlannedWorld, name: str, tried: Tried) -> Generator[Progr
     others = [j for j in found if not j.hinge and j not in around]
     above = [j for j in others if float(j.vertices[:, 2].min()) > float(near[2])]
     first = bool(around) and world.body.opening is None
-    return (yield from _move_one(world, opened, above if around else others, tried, closes_first=first))
+    return _one(opened, above if around else others, tried, closes_first=first)
 
 
 def open_into(world: PlannedWorld, where: str, tried: Tried) -> Generator[Program, str, bool]:
     """Opens a door or drawer of a container, the largest first, after those that were open without one above them had
     no place; shuts drawers above it before. Arguments and result as of `open_around`."""
+    return (yield from _move(world, _into(world, where, tried), tried))
+
+
+def is_shut(world: PlannedWorld, where: str, tried: Tried) -> bool:
+    """Whether there is a joint that `open_into` would move with a free hand."""
+    return _into(world, where, Tried(tried)) is not None
+
+
+def _into(world: PlannedWorld, where: str, tried: Tried) -> _Move | None:
+    """What `open_into` moves; drawers that are open without one above them count as full in `tried`."""
     found = joints_of(world, where) if world.domain.opens(where) else []
     out = [j for j in found if not j.hinge and j.fraction > AJAR]
     for joint in out:
         tried[f"{joint.name} full"] += not any(o.is_above(joint) for o in out)
     left = [j for j in found if j.hinge or not tried[f"{j.name} full"]]
     for joint in [j for j in left if not j.hinge][:1]:
-        if (yield from _move_one(world, [joint], [o for o in out if o.is_above(joint)], tried, closes_first=True)):
-            return True
-    return (yield from _move_one(world, left, [], tried))
+        above = [o for o in out if o.is_above(joint)]
+        if (move := _one([joint], above, tried, closes_first=True)) is not None:
+            return move
+    return _one(left, [], tried)
 
 
-def _move_one(
-    world: PlannedWorld,
-    opened: list[OpenableJoint],
-    closed: list[OpenableJoint],
-    tried: Tried,
-    closes_first: bool = False,
-) -> Generator[Program, str, bool]:
-    """Opens the first that is not wide open, else shuts the first that is open, else opens doors to their ends;
-    `closes_first`: shuts before it opens, as below an open drawer hands have little room."""
-    if all(world.held):
-        return False
+def _one(
+    opened: list[OpenableJoint], closed: list[OpenableJoint], tried: Tried, closes_first: bool = False
+) -> _Move | None:
+    """The first that is not wide open, to be opened, else the first that is open, to be shut, else a door that is to be
+    opened to its end; `closes_first`: shuts before it opens, as below an open drawer hands have little room."""
     shut = [j for j in opened if j.fraction < (WIDE if j.hinge else FAR_OUT) and tried[j.name] < TRIES]
     out = [j for j in closed if j.fraction > AJAR and tried[f"{j.name} shut"] < TRIES]
     wider = [j for j in opened if j.hinge and WIDE <= j.fraction < AT_END and tried[f"{j.name} wider"] < TRIES]
     if not shut and not out and not wider:
+        return None
+    if out and (not shut or closes_first):
+        return _Move(out[0], False, 0.0, f"{out[0].name} shut")
+    return _Move(shut[0], True, OPEN_TO, shut[0].name) if shut else _Move(wider[0], True, 1.0, f"{wider[0].name} wider")
+
+
+def _move(world: PlannedWorld, found: _Move | None, tried: Tried) -> Generator[Program, str, bool]:
+    """Moves what `_one` found, where a hand is free; returns whether it tried to."""
+    if found is None or all(world.held):
         return False
-    opens, to = not out or (bool(shut) and not closes_first), OPEN_TO if shut else 1.0
-    joint = (shut or wider)[0] if opens else out[0]
-    key = f"{joint.name} shut" if not opens else joint.name if shut else f"{joint.name} wider"
-    yield from move_joint(world, joint, free_hand(world, tried[key]), opens, tried[key], to)
+    joint, opens, key = found.joint, found.opens, found.key
+    yield from move_joint(world, joint, free_hand(world, tried[key]), opens, tried[key], found.to)
     now = {j.name: j.fraction for j in joints_of(world, joint.object)}
     tried[key] += _progress(joint, now, opens) < MOVED  # else the same way again, from where it is now
     return True

@@ -13,7 +13,7 @@ from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.clearance import HELD, Obstacles, straight
 from ig2mj.planning.driving import go
-from ig2mj.planning.grasping import grasp, is_graspable
+from ig2mj.planning.grasping import grasp, held_again, is_graspable, set_aside
 from ig2mj.planning.moves import (
     ATTEMPTS,
     LET_GO,
@@ -37,7 +37,7 @@ from ig2mj.planning.moves import (
     turning_point,
     vector3,
 )
-from ig2mj.planning.opening import Tried, open_into
+from ig2mj.planning.opening import Tried, is_shut, open_into
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.spots import Spot, ends_down, grip_for, is_tipped, put_there, spots_for, spots_upon
 from ig2mj.planning.stances import stances
@@ -199,7 +199,7 @@ def _find(
             found = _plan(world, predicate, name, hand, spots)
             if not isinstance(found, str):
                 return found, also
-        if predicate != "inside" or not (yield from open_into(world, where, opened)) or name not in world.held:
+        if predicate != "inside" or not (yield from _opened(world, where, opened)) or name not in world.held:
             break
     if isinstance(found, str) and until == "in_contact_with":
         upon = _plan(world, predicate, name, hand, spots_upon(world, name, where), search=True)
@@ -217,6 +217,15 @@ def _find(
             tight = (dataclasses.replace(spot, tight=True) for spot in spots_for(world, predicate, name, where))
             found = _plan(world, predicate, name, hand, tight)
     return found, ()
+
+
+def _opened(world: PlannedWorld, where: str, opened: Tried) -> Generator[Program, str, bool]:
+    """As `open_into`; where no hand is free, what one holds is put down for it."""
+    if not is_shut(world, where, opened):
+        return False
+    aside = yield from set_aside(world)
+    moved = yield from open_into(world, where, opened)
+    return moved and (not aside or (yield from held_again(world, aside)))
 
 
 def set_upright(world: PlannedWorld, where: str) -> Generator[Program, str, bool]:
@@ -333,7 +342,7 @@ def _plan(
         for spot, target, spheres in spots():
             lacking = _NO_STANCE if lacking == _NO_WAY and not seen else lacking
             palm = world.hand_axes(hand, grip_for(world, hand, name, spot)[2])[1]
-            away = world.away(spheres)
+            away = world.away(spheres, palm)
             if predicate == "under" and world.body.opening is None:
                 away = max(away, UNDER)
             for stance in stances(world, hand, target, floor, away, most=STANCES):

@@ -175,6 +175,7 @@ class StepBuilder:
         self._reach(name)
         if name not in self._held:
             self._free_hand(keep)
+            self._free_hand()  # of a robot with one hand, which takes what it keeps again
         self._add("toggle_on" if value else "toggle_off", name)
         self._on[name] = value
 

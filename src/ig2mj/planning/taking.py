@@ -8,7 +8,6 @@ import numpy as np
 
 from ig2mj.planning.grasps import GraspPose
 from ig2mj.planning.moves import (
-    BELOW,
     CLOSING,
     COMING,
     GRIPPING,
@@ -29,7 +28,7 @@ from ig2mj.planning.world import PlannedWorld, Vector
 def closing_on(world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: Sequence[Vector]) -> Program:
     """The hand goes along a way to before a grasp, on until it touches the object, and closes until it holds it."""
     index, quat = world.index(name), world.body.turned(hand, pose.fingers, pose.palm)
-    deep, floats = vector3(pose.at(-BELOW)), world.body.opening is None
+    deep, floats = vector3(pose.at(-pose.deep)), world.body.opening is None
     thin = floats and float(np.ptp(world.vertices(name) @ pose.palm)) < THIN
     near = Phase(
         hand=hand,

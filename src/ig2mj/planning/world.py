@@ -50,6 +50,9 @@ TUCKED = (0.5, 0.85, 0.22)
 AWAY, FARTHEST = 0.55, 0.95
 """m, horizontal, that a base would like to be from what its hand does, and from where it puts what is large."""
 
+POINTS = 0.2
+"""Horizontal part of where a gripper points, from which on it says on which side of it the robot stands."""
+
 Vector = Float[np.ndarray, "3"]
 Rotation = Float[np.ndarray, "3 3"]
 
@@ -305,9 +308,18 @@ class PlannedWorld:
             return self.planner.floor(view, footprint, without)
         return self.planner.floor(self.view, footprint, without, number)
 
-    def away(self, spheres: Float[np.ndarray, "S 4"]) -> float:
-        """m, horizontal, that a base would like to be from where a hand puts what it holds, whose spheres these are."""
-        return float(min(AWAY + max(np.linalg.norm(spheres[:, :2], axis=1).max() - ALONG[-1], 0.0), FARTHEST))
+    def away(self, spheres: Float[np.ndarray, "S 4"], palm: Vector) -> float:
+        """m, horizontal, that a base would like to be from where a hand puts what it holds, whose spheres these are.
+
+        Args:
+          palm: where it faces there: what a gripper points to is not between it and the robot.
+        """
+        out = -palm[:2]
+        if self.body.opening is None or np.linalg.norm(out) < POINTS:
+            far = np.linalg.norm(spheres[:, :2], axis=1).max()
+        else:
+            far = (spheres[:, :2] @ out).max() / np.linalg.norm(out)
+        return float(min(AWAY + max(far - ALONG[-1], 0.0), FARTHEST))
 
     def carry(self, hand: int, name: str = "") -> Vector:
         """Where a hand carries an object, "": what it holds, in the body's frame: as far ahead as that is wide, and, if
