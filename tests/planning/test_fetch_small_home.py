@@ -66,3 +66,20 @@ def test_fetch_pushes_a_chair_over_the_floor(simulation):
     simulation.set_object_pose("straight_chair_0", (0.6, 0.5, height), (1.0, 0.0, 0.0, 0.0))
     outcome = simulation.agent.do("push", "straight_chair_0", "coffee_table_0")
     assert outcome.done, outcome
+
+
+def test_fetch_turns_over_a_towel_that_lies_with_the_side_up_that_cleans(simulation):
+    simulation.reset()
+    simulation.set_object_pose("dishtowel_0", (0.2, 0.3, 0.01), (0.0, 1.0, 0.0, 0.0))
+    assert simulation.set_predicate("dusty", "coffee_table_0")
+    for request in ("grasp dishtowel_0", "wipe coffee_table_0 dishtowel_0"):
+        outcome = simulation.agent.do(*request.split())
+        assert outcome.done, f"{request}: {outcome}"
+
+
+def test_fetch_puts_down_what_it_holds_to_open_where_that_goes(simulation):
+    simulation.reset()
+    assert not simulation.predicate("open", "fridge_0")
+    for request in ("grasp plate_0", "place_inside plate_0 fridge_0"):
+        outcome = simulation.agent.do(*request.split())
+        assert outcome.done, f"{request}: {outcome}"

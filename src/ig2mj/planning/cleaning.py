@@ -43,6 +43,7 @@ from ig2mj.planning.phases import Phase
 from ig2mj.planning.placing import bring_out
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
+from ig2mj.planning.turning_over import turn_over
 from ig2mj.planning.world import DirtSpot, PlannedWorld, Stance, Vector
 
 ROUNDS = 24
@@ -56,6 +57,9 @@ TRIES = 4
 
 BESIDE, MOVED = 0.12, 4
 """m from dirt within which things are moved away where no tool reaches it, and how many at most."""
+
+TURNED = 2
+"""Times that a gripper turns over a tool which lies with the side up that cleans."""
 
 REGRASPS = 8
 """Times that a tool which was lost is taken again."""
@@ -73,7 +77,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             yield from put_down_others(world, tool)
             yield from toggle(True)(world, Step("toggle_on", (tool,)))
         reason, detail, lost, tried = "no_base", f"no dirt of {name} is in reach", 0, collections.Counter[int]()
-        visited: list[Stance] = []
+        visited, turned = list[Stance](), 0
         opened, moved, came = Tried(), set[str](), list[Vector]()
         for attempt in range(ROUNDS):
             if not world.facts.holds(predicate, name):
@@ -84,11 +88,17 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 if again is None or not again.done:
                     return Outcome("slipped", f"the hand lost {tool}", attempts=attempt + 1)
             hand = hand_with(world, tool)
-            if world.body.opening is None and is_covered(world, tool, hand):  # a gripper holds a tool by its edge
+            if world.body.opening is None and is_covered(world, tool, hand):
                 yield from put_down_others(world, tool)
                 if failed := (yield from hand_over(world, tool, hand)):
                     reason, detail = failed, f"{tool} cannot be taken by the side that does not clean"
                     continue
+                hand = hand_with(world, tool)
+            elif is_covered(world, tool, hand) and turned < TURNED:
+                turned += 1
+                yield from turn_over(world, tool, hand)
+                if not (yield from held_again(world, tool)):
+                    return Outcome("slipped", f"{tool} was put down to be turned over", attempts=attempt + 1)
                 hand = hand_with(world, tool)
             spots = [spot for spot in world.dirt(predicate, name) if tried[spot.number] < TRIES]
             spots.sort(key=lambda spot: tried[spot.number])

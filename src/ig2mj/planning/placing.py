@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.geometry.host_rotations import about_vertical
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.clearance import HELD, Obstacles, straight
@@ -43,7 +44,7 @@ from ig2mj.planning.spots import Spot, ends_down, grip_for, is_tipped, put_there
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.two_hands import place_with_both
-from ig2mj.planning.world import PlannedWorld, Stance, Vector
+from ig2mj.planning.world import PlannedWorld, Rotation, Stance, Vector
 from ig2mj.sampling.conditions import Condition
 
 SPARE = 0.03
@@ -112,24 +113,11 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             if name not in world.held:
                 reason, detail = "slipped", f"the hand lost {name}"
                 continue
-            planned = yield from from_home(world, hand, functools.partial(_way, world, name, hand, spot))
+            planned = yield from from_home(world, hand, functools.partial(way_to_spot, world, name, hand, spot))
             if planned is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
-            start, way, target, quat, back = planned
-            keeps, turned = world.index(name), quaternion(quat)
-            reason = yield [
-                *turn_at(world, hand, start, turned, keeps),
-                *travel(hand, way, turned, keeps=keeps),
-                Phase(hand=hand, pos=vector3(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1,
-                      limit=20, after="", speed=0.03),
-                Phase(hand=hand, close=False, until=Until.EMPTY, limit=10),
-                Phase(hand=hand, close=False, until=Until.WAITED, limit=OPENS),
-                Phase(hand=hand, pos=vector3(back), tolerance=0.04, limit=15, after=""),
-                *travel(hand, [*way[-2::-1], start], None),
-                *rest(hand),
-                Phase(until=Until.WAITED, limit=6 if spot.drop == 0.0 else FALLING),
-            ]  # fmt: skip
+            reason = yield letting_go(world, name, hand, planned, falls=spot.drop > 0.0)
             placed, detail = put_there(world.facts, step, until or predicate)
             if not placed:
                 reason = reason or "not_true_after"
@@ -144,11 +132,35 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
     return place
 
 
-def _way(
-    world: PlannedWorld, name: str, hand: int, spot: Spot
-) -> tuple[Vector, list[Vector], Vector, Sequence[float] | np.ndarray, Vector] | None:
-    """Where a hand turns what it holds, its way from there, where it lets go, its orientation there, and where it goes
-    back to then, from where the robot stands; None: there is no way."""
+def letting_go(world: PlannedWorld, name: str, hand: int, planned: Letting, falls: bool) -> Program:
+    """A hand brings what it holds where it lets it go, from where the robot stands, and goes back.
+
+    Args:
+      falls: it does not stand or lie there by itself.
+    """
+    start, way, target, quat, back = planned
+    keeps, turned = world.index(name), quaternion(quat)
+    return [
+        *turn_at(world, hand, start, turned, keeps),
+        *travel(hand, way, turned, keeps=keeps),
+        Phase(hand=hand, pos=vector3(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1, limit=20,
+              after="", speed=0.03),
+        Phase(hand=hand, close=False, until=Until.EMPTY, limit=10),
+        Phase(hand=hand, close=False, until=Until.WAITED, limit=OPENS),
+        Phase(hand=hand, pos=vector3(back), tolerance=0.04, limit=15, after=""),
+        *travel(hand, [*way[-2::-1], start], None),
+        *rest(hand),
+        Phase(until=Until.WAITED, limit=FALLING if falls else 6),
+    ]  # fmt: skip
+
+
+Letting = tuple[Vector, list[Vector], Vector, Sequence[float] | np.ndarray, Vector]
+"""Where a hand turns what it holds, its way from there, where it lets go, its orientation there, and where it goes back
+to then."""
+
+
+def way_to_spot(world: PlannedWorld, name: str, hand: int, spot: Spot) -> Letting | None:
+    """How a hand brings what it holds to a spot from where the robot stands; None: it has no way."""
     _, yaw = world.base
     target, quat, rotation = grip_for(world, hand, name, spot)
     fingers, palm = world.hand_axes(hand, rotation)
@@ -292,6 +304,26 @@ def bring_out(world: PlannedWorld, name: str) -> Primitive:
         if not taken.done:
             return taken
     return (yield from place("on_floor")(world, Step("place_on_floor", (name, world.facts.room(name)))))
+
+
+def let_fall(world: PlannedWorld, name: str, hand: int, tilt: Rotation) -> Generator[Program, str, bool]:
+    """Lets what a hand holds fall over on open floor, tilted from how it is held now; returns whether it did."""
+    for _ in range(ATTEMPTS):
+        spots = spots_for(world, "on_floor", name, world.facts.room(name), hanging=tilt)
+        found = _plan(world, "on_floor", name, hand, spots)
+        if isinstance(found, str):
+            return False
+        stance, spot = found
+        yaw = world.base[1]
+        if (yield from go(world, stance)) or name not in world.held:
+            return False
+        planned = yield from from_home(world, hand, functools.partial(way_to_spot, world, name, hand, spot))
+        if planned is not None:
+            yield letting_go(world, name, hand, planned, falls=True)
+            return name not in world.held
+        turn = about_vertical(world.base[1] - yaw)
+        tilt = turn @ tilt @ turn.T
+    return False
 
 
 _NO_SPOT, _NO_STANCE = "there is no room for a place where", "no free floor is in reach of a place where"
