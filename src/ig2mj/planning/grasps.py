@@ -12,7 +12,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.clearance import Obstacles
