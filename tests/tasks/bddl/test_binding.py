@@ -17,6 +17,7 @@ from ig2mj.scene.manifest import (
 from ig2mj.scene.paths import SHIPPED_HOMES
 from ig2mj.scene.scene import load_scene
 from ig2mj.simulation import Simulation
+from ig2mj.tasks.bddl.bare_floor import on_carpets
 from ig2mj.tasks.bddl.binding import BindingError, bind
 from ig2mj.tasks.bddl.definitions import load_activity
 from ig2mj.tasks.bddl.goal import conditions
@@ -213,3 +214,15 @@ def test_a_tool_that_the_goal_takes_and_the_home_lacks_is_added_and_lies_on_a_fl
     assert bound.tools == {"rag_0": "kitchen_0"}
     assert bound.additions[-1] == "rag/rag_00" and "rag_0" not in bound.objects.values()
     assert bind(meal, load_manifest(SHIPPED_HOMES / "maple")).tools == {}, "maple has a tool"
+
+
+def test_what_is_to_lie_on_the_floor_under_a_table_gets_one_that_stands_on_no_carpet():
+    assert "coffee_table_0" in on_carpets("maple") and "console_table_0" not in on_carpets("maple")
+    assert not on_carpets("no_such_home")
+    shoes = "gym_shoe.n.01_1 - gym_shoe.n.01 table.n.02_1 - table.n.02 floor.n.01_1 - floor.n.01"
+    rooms = "(inroom table.n.02_1 living_room) (inroom floor.n.01_1 living_room)"
+    under, floor = "(under gym_shoe.n.01_1 table.n.02_1)", "(onfloor gym_shoe.n.01_1 floor.n.01_1)"
+    maple = load_manifest(SHIPPED_HOMES / "maple")
+    for goal, table in ((f"(and {under} {floor})", "console_table_0"), (f"(and {under})", "coffee_table_0")):
+        binding = bind(activity(shoes, rooms, goal), maple)
+        assert binding.objects["table.n.02_1"] == table

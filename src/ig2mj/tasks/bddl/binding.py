@@ -4,7 +4,8 @@ An object with an `inroom` condition is one that stands in a room of that kind. 
 room if that is possible, and whatever a condition of the start relates is in one room anyway (iGibson takes one room
 for all of a kind). Every other object is one of the home's that no other has taken, else one of the object library; so
 is one with `inroom` of which the room has too few, where it is not a furniture that is fixed. All choices are the first
-possible in the home's order: the same home, the same binding.
+possible in the home's order: the same home, the same binding. Furniture under which the goal has something on the floor
+comes first where it does not stand on a carpet.
 
 A goal that wants something cleaned or cut may be bound where nothing cleans or cuts, since definitions do not always
 name the tool: one of the library is added, on the floor of a room with water.
@@ -24,6 +25,7 @@ from ig2mj.scene.extras import ATTACHED, BROKEN, ON_FIRE, PREFIX, attached_as_te
 from ig2mj.scene.library import LibraryModel, library, split_models
 from ig2mj.scene.manifest import Manifest, ObjectEntry
 from ig2mj.scene.substance_requests import substances_as_text
+from ig2mj.tasks.bddl.bare_floor import on_carpets
 from ig2mj.tasks.bddl.matching import clusters_of, match, search_rooms
 from ig2mj.tasks.bddl.synsets import AGENT, Kinds, kinds
 from ig2mj.tasks.bddl.vocabulary import Activity
@@ -145,6 +147,9 @@ class _Binder:
         }
         for name in self.holders & set(self.players) - set(self.activity.rooms):
             self.players[name].sort(key=lambda o: -_room(o))
+        for name in _over_the_floor(activity) & set(self.players):
+            covered = on_carpets(manifest.name)
+            self.players[name].sort(key=lambda o: o.name in covered)
         self.objects: dict[str, str] = {}
         self.rooms: dict[str, str] = {}
         self.added: dict[str, LibraryModel] = {}
@@ -312,6 +317,13 @@ def able(o: ObjectEntry, predicates: Iterable[str]) -> bool:
         if name == "saturated" and not {"soakable", "cleaningTool"} & set(o.abilities):
             return False
     return True
+
+
+def _over_the_floor(activity: Activity) -> set[str]:
+    """Objects of an activity under which its goal has something that is on the floor there."""
+    goal = logic.atoms(logic.ground(logic.And(activity.goal), activity.objects.__getitem__))
+    lying = {a.arguments[0] for a in goal if a.predicate == "on_floor"}
+    return {a.arguments[1] for a in goal if a.predicate == "under" and a.arguments[0] in lying}
 
 
 def _room(o: ObjectEntry) -> float:
