@@ -1,5 +1,6 @@
 """Where a cleaning tool goes to take a particle off, and what its box covers there."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,6 +17,7 @@ from ig2mj.planning.cleaning_strokes import (
     regions_of,
     turn_about,
 )
+from ig2mj.planning.tool_areas import is_hidden
 from ig2mj.planning.world import DirtSpot
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -115,3 +117,25 @@ def test_what_stands_next_to_a_particle_leaves_room_for_a_tool_that_is_shifted()
     spot = DirtSpot(0, np.zeros(3), UP)
     reach = [region.box(region.at(spot))[1][0] for region in regions_of(held_rag(), 0.0, UP)]
     assert reach[0] > wall and min(reach) < wall
+
+
+def test_a_cleaning_area_inside_of_its_tool_is_hidden(tiny_home):
+    tables = tiny_home.tables
+    piece = int(np.flatnonzero(tables.piece_object == tables.object_names.index("book"))[0])
+    half = np.ptp(tables.piece_vertices[piece], axis=0) / 2
+
+    def hidden(share):
+        first = {
+            "link_body": int(tables.piece_body[piece]),
+            "link_geom": -1,
+            "link_pos": tables.piece_pos[piece],
+            "link_quat": tables.piece_quat[piece],
+            "link_half": share * half,
+        }
+        changed = {name: getattr(tables, name).copy() for name in first}
+        for name, value in first.items():
+            changed[name][0] = value
+        return is_hidden(dataclasses.replace(tables, **changed), 0)
+
+    assert hidden(0.5) and not hidden(1.0)
+    assert not is_hidden(tables, -1)

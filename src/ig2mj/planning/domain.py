@@ -13,6 +13,7 @@ from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.knowledge.substances import DUST, WATER
 from ig2mj.knowledge.transitions import STIRRERS, Transition
 from ig2mj.planning.steps import PRIMITIVES, Step
+from ig2mj.planning.tool_areas import is_hidden
 from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.registry import find
@@ -140,8 +141,10 @@ class Domain:
 
     @functools.cached_property
     def tools(self) -> tuple[str, ...]:
-        """Cleaning tools that can be carried."""
-        return tuple(t for t in self._loose("cleaningTool") if self.graspable(t))
+        """Cleaning tools that can be carried; of these, if there are any, those that clean with what touches a face."""
+        tools = tuple(t for t in self._loose("cleaningTool") if self.graspable(t))
+        links = dict(zip(self.model.parameters.tool_object, self.model.parameters.tool_link, strict=True))
+        return tuple(t for t in tools if not is_hidden(self.model.tables, int(links[self.index(t)]))) or tools
 
     @functools.cached_property
     def knives(self) -> tuple[str, ...]:
