@@ -189,7 +189,7 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
         Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=True, tolerance=0.04, limit=30, after="",
               speed=0.03),
         *travel(hand, [p + lift for p in way[-2::-1]], None, keeps=index),
-        carry(world, hand, keeps=index, name=name),
+        carry(world, hand, keeps=index, name=name, grip=pose.point),
     ]  # fmt: skip
     if name in world.held:
         return "", ""

@@ -321,14 +321,24 @@ class PlannedWorld:
             far = (spheres[:, :2] @ out).max() / np.linalg.norm(out)
         return float(min(AWAY + max(far - ALONG[-1], 0.0), FARTHEST))
 
-    def carry(self, hand: int, name: str = "") -> Vector:
-        """Where a hand carries an object, "": what it holds, in the body's frame: as far ahead as that is wide, and, if
-        the hand floats, so high that what hangs below it passes over counters."""
+    def carry(self, hand: int, name: str = "", grip: Vector | None = None) -> Vector:
+        """Where a hand carries an object, "": what it holds, in the body's frame: as far ahead as that is wide, on an
+        arm as far as it reaches back from the hand, and, if the hand floats, so high that what hangs below it passes
+        over counters.
+
+        Args:
+          grip: where a hand on an arm will hold the object, that is where it is now; None: where it holds it.
+        """
         x, y, z = self.body.carry[hand]
         if name := name or self.held[hand]:
-            low, high = self.vertices(name).min(0), self.vertices(name).max(0)
+            corners = self.vertices(name)
+            low, high = corners.min(0), corners.max(0)
             half = float(np.linalg.norm((high - low)[:2])) / 2
-            x = max(x, self.body.trunk[0] + BODY_SPARE + half)
+            back, yaw = half, self.base[1]
+            if self.body.opening is not None and (grip is not None or self.held[hand] == name):
+                offset = (self.grip(hand) if grip is None else grip) - corners
+                back = float((offset[:, :2] @ (np.cos(yaw), np.sin(yaw))).max())
+            x = max(x, self.body.trunk[0] + BODY_SPARE + back)
             y = 0.0 if half > WIDE and self.body.opening is None else y  # the middle of the way through a door
             if self.body.opening is None and self.held[hand] == name and self.held.count(name) == 1:
                 z += self._raised(hand, float(low[2]), float(high[2]))

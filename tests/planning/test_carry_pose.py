@@ -1,0 +1,47 @@
+"""How far ahead of a robot a hand carries what it holds, and how far from what a gripper puts away a base stands."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ig2mj.planning.world import AWAY, BODY_SPARE, PlannedWorld
+
+TRUNK = 0.3
+
+
+class _World(PlannedWorld):
+    """A robot at the origin that looks along y and holds a board of 0.4 m before it."""
+
+    def __init__(self, opening, held="board"):
+        body = SimpleNamespace(opening=opening, carry=np.array([[0.3, 0.1, 1.1]]), trunk=(TRUNK, 1.5), stands=0.0)
+        self.body, self._held = body, held  # pyright: ignore[reportAttributeAccessIssue]
+
+    @property
+    def base(self):
+        return np.zeros(2), np.pi / 2
+
+    @property
+    def held(self):
+        return [self._held]
+
+    def vertices(self, name):
+        return np.array([[x, y, 1.0] for x in (-0.2, 0.2) for y in (0.5, 0.9)])
+
+    def grip(self, hand):
+        return np.array([0.0, 0.51, 1.05])
+
+
+def test_an_arm_carries_a_board_that_reaches_ahead_of_the_hand_near_the_body():
+    assert _World(0.1).carry(0)[0] == pytest.approx(TRUNK + BODY_SPARE + 0.01)
+    assert _World(None).carry(0)[0] == pytest.approx(TRUNK + BODY_SPARE + 0.4 / np.sqrt(2))
+    behind = np.array([0.0, 0.9, 1.05])
+    assert _World(0.1, held="").carry(0, "board", behind)[0] == pytest.approx(TRUNK + BODY_SPARE + 0.4)
+
+
+def test_a_base_stands_nearer_to_what_its_gripper_puts_away_from_it():
+    board = np.array([[0.0, y, 0.0, 0.01] for y in (0.0, 0.2, 0.4)])
+    down, away = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.6, -0.8])
+    assert _World(0.1).away(board, away) == pytest.approx(AWAY)
+    assert _World(0.1).away(board, -away) > AWAY + 0.2
+    assert _World(0.1).away(board, down) == _World(None).away(board, away) > AWAY + 0.2
