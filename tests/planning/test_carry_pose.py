@@ -1,10 +1,11 @@
-"""How far ahead of a robot a hand carries what it holds, and how far from what a gripper puts away a base stands."""
+"""Where hands carry what they hold, from where a base puts it away, and how far an arm has to reach."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from ig2mj.planning.moves import goes_on
 from ig2mj.planning.world import AWAY, BODY_SPARE, PlannedWorld
 
 TRUNK = 0.3
@@ -45,3 +46,22 @@ def test_a_base_stands_nearer_to_what_its_gripper_puts_away_from_it():
     assert _World(0.1).away(board, away) == pytest.approx(AWAY)
     assert _World(0.1).away(board, -away) > AWAY + 0.2
     assert _World(0.1).away(board, down) == _World(None).away(board, away) > AWAY + 0.2
+
+
+class _Arm:
+    """Reaches 0.8 m, whatever is in the way."""
+
+    def reaches(self, point):
+        return bool(np.linalg.norm(point) <= 0.8)
+
+    def __call__(self, points):
+        return self.passes(points)
+
+    def passes(self, points):
+        return all(self.reaches(point) for point in points)
+
+
+def test_an_arm_has_to_reach_a_grasp_itself_not_only_the_place_before_it():
+    before, grasp = np.array([0.75, 0.0, 0.0]), np.array([0.85, 0.0, 0.0])
+    assert goes_on([before], before, _Arm()) and not goes_on([before], grasp, _Arm())
+    assert goes_on([before], grasp, None) and not goes_on(None, before, None)

@@ -24,6 +24,7 @@ from ig2mj.planning.moves import (
     first_way,
     free_hand,
     from_home,
+    goes_on,
     hand_path,
     hand_with,
     rest,
@@ -229,7 +230,8 @@ def _plan(
         spheres, goal, back = world.spheres(pose.fingers, pose.palm), pose.at(pose.before), entries(pose, stance.xy)
         follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles, stance)
         rests, standing = world.resting(hand, stance), world.standing(obstacles, stance, hand)
-        return hand_path(standing, spheres, rests, goal, back, search=search, follows=follows) is not None
+        way = hand_path(standing, spheres, rests, goal, back, search=search, follows=follows)
+        return goes_on(way, pose.at(0.0), follows)
 
     return first_way(candidates(), has_way, WAYS)
 

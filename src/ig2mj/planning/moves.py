@@ -121,6 +121,11 @@ def hand_path(
     return None
 
 
+def goes_on(way: Sequence[Vector] | None, point: Vector, follows: Follower | None) -> bool:
+    """Whether there is a way of a hand, and an arm takes it on to a point, whatever is there."""
+    return way is not None and (follows is None or follows.passes([*way, point]))
+
+
 RAISED, DRAWN_BACK = (0.0, 0.08, 0.16, 0.28, 0.4), (0.0, 0.12)
 """m by which a hand is raised, and drawn back to the robot, where what it holds has no room to be turned."""
 

@@ -16,6 +16,7 @@ from ig2mj.planning.moves import (
     TOUCHING,
     UP,
     Program,
+    goes_on,
     hand_path,
     towards,
     travel,
@@ -54,7 +55,8 @@ def way_to(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> list[V
     obstacles, spheres = world.obstacles([name]), world.spheres(pose.fingers, pose.palm)
     follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles)
     back = entries(pose, world.base[0])
-    return hand_path(obstacles, spheres, world.grip(hand), pose.at(pose.before), back, search=True, follows=follows)
+    way = hand_path(obstacles, spheres, world.grip(hand), pose.at(pose.before), back, search=True, follows=follows)
+    return way if goes_on(way, pose.at(0.0), follows) else None
 
 
 def entries(pose: GraspPose, xy: Sequence[float] | np.ndarray) -> list[Vector]:
