@@ -314,6 +314,8 @@ def test_a_container_that_is_carried_out_of_a_narrow_place_is_put_on_the_floor_n
     failed, room = {"place_inside apple pan": 1}, facts.room("pan")
     taken_out = ["grasp pan", f"place_on_floor pan {room}", "grasp apple", "place_inside apple pan"]
     assert [str(s) for s in planner.plan(facts, failed_steps=failed).steps] == taken_out
+    other = {"place_inside ball pan": 1}  # where something else had no place
+    assert [str(s) for s in planner.plan(facts, failed_steps=other).steps] == taken_out
     facts.held = ["pan"]
     assert [str(s) for s in planner.plan(facts, failed_steps=failed).steps] == taken_out[1:]
     steps = planner.plan(facts, failed_steps={**failed, f"place_on_floor pan {room}": 3}).steps

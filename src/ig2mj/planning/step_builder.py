@@ -373,7 +373,7 @@ class StepBuilder:
                 self._free_hand()
                 self._put("push", name, target, rules[1:])
                 continue
-            if rule.predicate == "inside" and self._failures(("place_inside", name, target)):
+            if rule.predicate == "inside" and self._had_no_place("place_inside", target):
                 self._clear_out(target)
             if rule.predicate == "on_top":
                 self._lay_flat(target, c)
@@ -407,13 +407,17 @@ class StepBuilder:
         if not self._domain.graspable(name) or high[2] - low[2] < FLAT * self._domain.thickness(name):
             return
         own = any(s.primitive in PLACE.values() and s.arguments[0] == name for s in self.steps)
-        if own or not any(s.startswith("place_on_top ") and s.endswith(f" {name}") for s in self._failed_steps):
+        if own or not self._had_no_place("place_on_top", name):
             return
         if self._placed_otherwise(name, c):
             self._elsewhere(name, c, flat=True)
         elif near := min(self._domain.supports, key=self._far_from(name), default=""):
             self._take(name)
             self._put("place_on_top", name, near, flat=True)
+
+    def _had_no_place(self, primitive: str, where: str) -> bool:
+        """Whether something could not be placed somewhere."""
+        return any(s.startswith(f"{primitive} ") and s.endswith(f" {where}") for s in self._failed_steps)
 
     def _crowding(self, rule: Condition, c: Condition) -> Condition | None:
         """After failures of a placement, one of the things that are there already: it is taken out first and put back

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from ig2mj.planning.moves import (
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.taps import hold_below_tap
-from ig2mj.planning.world import PlannedWorld, Rotation, Vector
+from ig2mj.planning.world import PlannedWorld, Rotation, Stance, Vector
 from ig2mj.scene.tables import LinkKind
 
 SOAKING, COOKING, FREEZING = 8.0, 90.0, 200.0
@@ -41,18 +41,52 @@ def _blades_at(
     world: PlannedWorld, knife: str, hand: int, points: Sequence[Vector], link: int, first: int
 ) -> list[Hold]:
     """The blade of a held knife at some points, with its edge down, and as it is held, turned about the vertical: where
-    its flat lies on what is cut, that rolls away.
+    its flat lies on what is cut, that rolls away. A number of a hold leaves the row of `PARTS_OF_BLADE` as remainder.
 
     Args:
       link: of the knife, its blade. first: number of the way that comes first; even ones: with the edge down, of a hand
         on an arm, as it is held.
     """
-    offset = world.grip(hand) - np.asarray(world.view.link_pos)[world.world, link].astype(float)
     turns = np.roll([about_vertical(turn) for turn in BLADE_TURNS], -first, axis=0)
     tilts = [_edge_down(world, knife, link), np.eye(3)]
     tilts = tilts if (first % 2 == 0) == (world.body.opening is None) else tilts[::-1]
-    ways = [(point, turn @ tilt) for tilt in tilts if tilt is not None for point in points for turn in turns]
-    return [Hold(point, turn @ offset, turn, number) for number, (point, turn) in enumerate(ways)]
+    offsets = [world.grip(hand) - _part_of_blade(world, hand, link, part) for part in range(len(PARTS_OF_BLADE))]
+    ways = [
+        (point, turn @ tilt, part, offset)
+        for tilt in tilts
+        if tilt is not None
+        for part, offset in enumerate(offsets)
+        for point in points
+        for turn in turns
+    ]
+    count = len(PARTS_OF_BLADE)
+    return [Hold(point, turn @ offset, turn, count * k + part) for k, (point, turn, part, offset) in enumerate(ways)]
+
+
+def _tip_first(holds: Callable[[], Sequence[Hold]]) -> list[Hold]:
+    """Holds of a blade, those first with the hand farthest from what is cut."""
+    return sorted(holds(), key=lambda hold: -(hold.number % len(PARTS_OF_BLADE)))
+
+
+def _part_of_blade(world: PlannedWorld, hand: int, link: int, part: int) -> Vector:
+    """Where a part of the blade of a held knife is, a row of `PARTS_OF_BLADE`."""
+    pos, quat = (np.asarray(v)[world.world, link].astype(float) for v in (world.view.link_pos, world.view.link_quat))
+    half = world.domain.model.tables.link_half[link]
+    along = matrices_on_host(quat[None])[0][:, int(np.argmax(half))] * float(half.max())
+    away = 1.0 if along @ (pos - world.grip(hand)) >= 0.0 else -1.0
+    return pos + PARTS_OF_BLADE[part] * away * along
+
+
+def _hand_is_off(world: PlannedWorld, knife: str, hand: int, top: Vector) -> Callable[[Stance, Hold], bool]:
+    """Whether the hand meets nothing, nor what is cut, when the blade comes to its top (m, world frame)."""
+    obstacles, now = world.obstacles([knife], stays=False), world.base[1]
+
+    def is_off(stance: Stance, hold: Hold) -> bool:
+        turn = about_vertical(stance.yaw - now)
+        spheres = world.spheres(*world.hand_axes(hand, turn @ hold.tilt)) * (1.0, 1.0, 1.0, HAND_SHARE)
+        return obstacles.clear(spheres + np.array([*(top - IN_CUT * UP + turn @ hold.offset), 0.0]))
+
+    return is_off
 
 
 def _edge_down(world: PlannedWorld, knife: str, link: int) -> Rotation | None:
@@ -183,14 +217,17 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
         top = np.array([*world.com(name)[:2], world.vertices(name)[:, 2].max()])
         points = [top + above * UP for above in CUT_ABOVE]
         holds = functools.partial(_blades_at, world, knife, hand, points, int(links[0]), attempt)
-        reason, way, _ = yield from hold_at(world, knife, hand, holds)
+        reason, way, number = yield from hold_at(world, knife, hand, holds, _hand_is_off(world, knife, hand, top))
+        if reason == "no_path":
+            reason, way, number = yield from hold_at(world, knife, hand, functools.partial(_tip_first, holds))
         if reason:
             continue
+        part = number % len(PARTS_OF_BLADE)
         keeps, before = world.index(knife), world.grip(hand)
         down, tolerance, limit, speed = CUT if world.body.opening is None else ARM_CUT
-        above = float(np.asarray(world.view.link_pos)[world.world, links[0], 2] - top[2])
+        above = float(_part_of_blade(world, hand, int(links[0]), part)[2] - top[2])
         for depth in np.arange(above - down, -CUT_DEPTH - down / 2, -down):  # no farther than the cut
-            blade = np.asarray(world.view.link_pos)[world.world, links[0]].astype(float)
+            blade = _part_of_blade(world, hand, int(links[0]), part)
             pressed = vector3(top + depth * UP - blade + world.grip(hand))
             reason = yield [
                 Phase(hand=hand, pos=pressed, keeps=keeps, tolerance=tolerance, limit=limit, after="", speed=speed)
@@ -207,6 +244,13 @@ def slice_(world: PlannedWorld, step: Step) -> Primitive:
 
 EDGE = 0.005
 """m between a blade and the middle of its knife, across the blade, from which on it is the knife's edge."""
+
+PARTS_OF_BLADE = (0.0, 0.5, 0.85)
+"""Parts of a blade that cut: shares of the way from its middle to its end away from the hand."""
+
+IN_CUT, HAND_SHARE = 0.01, 0.7
+"""m that the blade is in what it cuts when the hand has to be off that, and share of its spheres' radii: it is
+closed."""
 
 BLADE_TURNS = (0.0, 0.6, -0.6, 1.2, -1.2)
 """rad by which a blade is turned about the vertical: what rolled away from it is cut from another side."""
