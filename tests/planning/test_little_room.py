@@ -8,13 +8,14 @@ import pytest
 
 import ig2mj
 from ig2mj.agents import Humanoid
-from ig2mj.planning import clutter, grasps
+from ig2mj.planning import clutter, grasps, opening
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.free_floor import FreeFloor
 from ig2mj.planning.joints import openable_joints
 from ig2mj.planning.motion_planner import MotionPlanner
+from ig2mj.planning.phases import Until
 from ig2mj.planning.pushing import _ways_aside
 from ig2mj.planning.spots import spots_upon
 from ig2mj.planning.stances import stances
@@ -161,6 +162,16 @@ def test_what_slides_is_taken_by_its_sides_at_several_heights_and_places(world):
         assert np.isclose((point - (low if normal.sum() < 0 else high)) @ normal, 0.0)
     points = np.array([point for point, _ in drawer.edges])
     assert len(np.unique(points[:, 2].round(3))) == 3 and len(np.unique((points @ drawer.axis).round(3))) == 3
+
+
+def test_a_hand_goes_off_a_drawer_while_it_lets_go_of_it(world):
+    joints = openable_joints(world.stage.scene, world.view, world.index("cabinet"))
+    (drawer,) = [joint for joint in joints if not joint.hinge]
+    plan = opening._plan(world, drawer, 1, True, 0)
+    program = opening._program(world, drawer, 1, plan)
+    (lets_go,) = [phase for phase in program if phase.until == Until.EMPTY]
+    point, normal = plan.places[-1]
+    assert plan.pulls and (np.array(lets_go.pos) - point) @ normal > 0.1
 
 
 def test_floor_from_where_hands_reach_with_ease_comes_first(world, monkeypatch):

@@ -428,6 +428,8 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
             hand=hand, pos=vector3(first + NEAR * normal), quat=quat, tolerance=0.01, limit=12, after="", speed=COMING
         )
         limit = 20 + int(np.linalg.norm(places[1][0] - first) / speed)
+        # A palm is in the face that it holds: what slides is pushed back where the palm stays there while it opens.
+        off = vector3(places[-1][0] + RETREAT * places[-1][1]) if floats and not joint.hinge else None
         program += [
             *([near] if floats else []),
             Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), quat=quat, until=Until.TOUCHED, object=index,
@@ -436,7 +438,7 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
                   limit=15, after="no_grasp", speed=CLOSING if floats else GRIPPING),
             *[Phase(hand=hand, pos=vector3(p), close=True, tolerance=tolerance, limit=limit, after="", keeps=index,
                     speed=speed) for p, _ in places[1:]],
-            Phase(hand=hand, close=False, until=Until.EMPTY, limit=10, after=""),
+            Phase(hand=hand, pos=off, close=False, until=Until.EMPTY, limit=10, after=""),
         ]  # fmt: skip
     program.append(Phase(hand=hand, pos=vector3(places[-1][0] + RETREAT * places[-1][1]), limit=12, after=""))
     return program
