@@ -8,7 +8,8 @@ import pytest
 
 import ig2mj
 from ig2mj.agents import Humanoid
-from ig2mj.planning import clutter, grasps, opening
+from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.planning import clutter, grasps, opening, spots
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
@@ -214,3 +215,14 @@ def test_lids_and_flaps_are_no_part_of_what_is_taken_hold_of(world):
     assert (flapped.piece_object == book).sum() > len(own)
     assert np.array_equal(grasps.main_pieces(flapped, book), own)
     assert np.array_equal(grasps.main_pieces(tables, cabinet), np.flatnonzero(tables.piece_object == cabinet))
+
+
+def test_what_has_no_place_inside_in_the_nearest_orientations_is_turned_further(world, monkeypatch):
+    half = np.sqrt(0.5)
+    quats = [(1, 0, 0, 0), (0, 1, 0, 0), (half, half, 0, 0), (half, -half, 0, 0), (half, 0, half, 0)]
+    monkeypatch.setattr(spots, "_orientations", lambda *_: [types.SimpleNamespace(quat=q) for q in quats])
+    few, every = (spots._upright(world, "book", every=every) for every in (False, True))
+    assert len(few) == spots.ORIENTATIONS and len(every) == len(quats)
+    assert all(np.array_equal(a, b) for a, b in zip(few, every[: len(few)], strict=True))
+    below = {tuple(matrices_on_host(quat[None])[0][2].round(3)) for quat in every}
+    assert len(below) == len(quats)

@@ -53,6 +53,9 @@ CLEARLY = 0.05
 MOVED = 0.03
 """m that an object has moved beyond which its grasp is planned again."""
 
+RESTS = 15
+"""Agent steps in which what has moved comes to rest."""
+
 ARM_ATTEMPTS = 8
 """Tries of a gripper, whose fingers have to come below or around what a palm only touches."""
 
@@ -114,6 +117,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
             continue
         if np.linalg.norm(world.com(name) - before) > MOVED:
             reason, detail = "no_grasp", f"{name} was moved while the robot went there"
+            yield [Phase(until=Until.WAITED, limit=RESTS)]
             continue
         tried.append(pose)
         reason, detail = yield from _take(world, name, hand, pose)

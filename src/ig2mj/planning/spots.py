@@ -43,7 +43,8 @@ TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 """rad about the vertical that an object may be turned by, from how it is held in front of the robot."""
 
 ORIENTATIONS, ORIENTATION_SPREAD = 2, 1.7
-"""Orientations at rest that are tried, and rad by which they may be farther from the present one than the nearest."""
+"""Orientations at rest that are tried, and rad by which they may be farther from the present one than the nearest;
+others where something has no place inside of something in these."""
 
 OPEN = 0.25
 """m to spare for the robot where it could stand, from which on floor is open."""
@@ -110,11 +111,15 @@ def spots_for(
     drawers = [j for j in own if not j.hinge]
     around = world.obstacles([name], stays=False)
     wide = max(CORNER, WIDE * float(np.sort(np.ptp(world.vertices(name), axis=0))[1]) / 2)
-    turned = [(quat, angle) for quat in _upright(world, name, flat) for angle in TURNS]
+    orientations = _upright(world, name, flat, every=predicate == "inside")
+    turned = [(quat, angle) for quat in orientations for angle in TURNS]
     if world.body.opening is not None:
         level = level_orientations(world, name) if predicate in ("inside", "under") else []
         turned = [(quat, angle) for angle in ARM_TURNS for quat in (*level, *_upright(world, name, flat))]
-    for quat, angle in turned:
+    proposed = 0
+    for number, (quat, angle) in enumerate(turned):
+        if proposed and number >= len(TURNS) * ORIENTATIONS and world.body.opening is None:
+            return
         new = _yawed(quat, angle)
         for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
             found, asked = list[Vector](), 0
@@ -137,6 +142,7 @@ def spots_for(
                 at, turn = (pos, new) if hanging is None else _hanging(world, name, pos, new, hanging, angle)
                 if not without_contact or _would_hold(world, without_contact, name, at, turn):
                     found.append(pos)
+                    proposed += 1
                     yield Spot(at, turn, bool(roofed[k]))
             if found:
                 break
@@ -283,9 +289,13 @@ def is_tipped(world: PlannedWorld, name: str) -> bool:
     return float(matrices_on_host(world.pose(name)[1][None])[0][2, 2]) < STANDS
 
 
-def _upright(world: PlannedWorld, name: str, flat: bool = False) -> list[Float[np.ndarray, "4"]]:
-    """Orientations in which an object rests, each the nearest to its present one; that, where none is known. Of what
-    opens, those come first in which it stands, so that it can be filled. `flat`: just those in which it is lowest."""
+def _upright(world: PlannedWorld, name: str, flat: bool = False, every: bool = False) -> list[Float[np.ndarray, "4"]]:
+    """Orientations in which an object rests, each the nearest to its present one, at most `ORIENTATIONS`; that, where
+    none is known. Of what opens, those come first in which it stands, so that it can be filled.
+
+    Args:
+      flat: just those in which it is lowest. every: all of them, and also those farther from the present one.
+    """
     _, now = world.pose(name)
     frame, found = matrices_on_host(now[None])[0], []
     own = [matrices_on_host(np.array([e.quat], float))[0][2] for e in _orientations(world, name)]
@@ -303,6 +313,8 @@ def _upright(world: PlannedWorld, name: str, flat: bool = False) -> list[Float[n
         found.append((angle, np.asarray(quat_multiply(tilt, now), float)))
     found.sort(key=lambda pair: pair[0])
     kept = [quat for angle, quat in found if angle < found[0][0] + ORIENTATION_SPREAD][:ORIENTATIONS]
+    if every and world.body.opening is None:
+        kept += [quat for _, quat in found if not any(quat is k for k in kept)]
     return kept or [now]
 
 
