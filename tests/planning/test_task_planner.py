@@ -156,6 +156,16 @@ def test_a_support_on_which_something_did_not_stay_is_laid_flat_if_it_is_not(sam
     assert solve(planner, standing)[0].success
 
 
+def test_a_partner_that_belongs_in_a_room_is_placed_there_again(sampler, start):
+    room = sampler.model.tables.room_names[0]
+    planner = planner_of(sampler.model, f"(and (on_floor ball {room}) (on_floor apple {room}) (next_to ball apple))")
+    facts = SymbolicRung(planner.domain, sampler, [start]).facts(0)
+    assert facts.containers(room) == ()
+    near = next(c for c in planner.plan(facts).required if c.predicate == "next_to")
+    steps = [str(step) for step in planner.plan(facts, {near: 2}).steps]
+    assert sum(step.startswith("place_on_floor") and step.endswith(room) for step in steps) == 2, steps
+
+
 @pytest.mark.slow
 def test_halves_are_moved_after_a_cut(sampler, start):
     cut = started(sampler, start, "(sliced apple)")

@@ -78,7 +78,9 @@ class Facts:
         return bool(np.asarray(self.states.sliced)[0, self.domain.index(name)]) and bool(self.domain.halves(name))
 
     def containers(self, name: str) -> tuple[str, ...]:
-        """Objects with doors, drawers or lids that the object is inside of."""
+        """Objects with doors, drawers or lids that an object is inside of; none for a room."""
+        if name in self.domain.model.tables.room_names:
+            return ()
         middle = self.place(name)
         near = []
         for other in self.domain.openable:
