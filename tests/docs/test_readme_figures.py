@@ -32,6 +32,7 @@ WORDS = (
     "twelve",
     "fifteen",
     "sixteen",
+    "eighteen",
     "hundred",
 )
 
@@ -55,7 +56,7 @@ def facts() -> list[str]:
     policies = len(list((ROOT / "policies").glob("*.npz")))
     speed = max(_speeds("the home `birch`"))
     image = SensorOptions()
-    number = {4: "four", 16: "Sixteen"}
+    number = {4: "four", 18: "Eighteen"}
     return [
         f"**{len(homes)} furnished homes** with {rooms} rooms and {models:,} object models ship",
         f"{len(PREDICATES)} predicates",

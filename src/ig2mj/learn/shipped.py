@@ -151,6 +151,18 @@ def _without_paths(command: str) -> str:
     return shlex.join(kept)
 
 
+def _varied(randomize: str) -> str:
+    """Axes of a run's `randomize` for people, with the settings that are not the usual ones."""
+    if not randomize.startswith("{"):
+        return randomize.replace(",", ", ")
+    words = list[str]()
+    for axis, settings in json.loads(randomize).items():
+        own = settings.items() if isinstance(settings, dict) else ()
+        numbers = ", ".join(f"{k} {' to '.join(map(str, v)) if isinstance(v, list) else v}" for k, v in own)
+        words += [f"{axis} ({numbers})" if numbers else axis] * bool(settings)
+    return ", ".join(words)
+
+
 def model_card(name: str, policy: Policy) -> str:
     """A page in Markdown: what a policy is for, how it was made, how good it is, and what it does not do."""
     card: Mapping[str, Any] = policy.card
@@ -184,7 +196,7 @@ def model_card(name: str, policy: Policy) -> str:
         "environment steps": f"{card['env_steps']:,}" if card.get("env_steps") else None,
         "device": card.get("device"),
         "homes of training": ", ".join(card["homes"]) if "homes" in card else None,
-        "differs between its episodes": card.get("run_settings", {}).get("randomize", "").replace(",", ", ") or None,
+        "differs between its episodes": _varied(card.get("run_settings", {}).get("randomize", "")) or None,
         "scene": None if "homes" in card else card.get("scene"),
         "weights": policy.weights_digest,
     }
