@@ -9,7 +9,7 @@ import pytest
 import ig2mj
 from ig2mj.agents import Humanoid
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning import clutter, grasps, opening, spots
+from ig2mj.planning import clutter, grasps, opening, placing, spots
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
@@ -20,7 +20,7 @@ from ig2mj.planning.phases import Until
 from ig2mj.planning.pushing import _ways_aside
 from ig2mj.planning.spots import spots_upon
 from ig2mj.planning.stances import stances
-from ig2mj.planning.steps import Step
+from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import AWAY, PlannedWorld
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.worlds.rules import Rules
@@ -226,3 +226,46 @@ def test_what_has_no_place_inside_in_the_nearest_orientations_is_turned_further(
     assert all(np.array_equal(a, b) for a, b in zip(few, every[: len(few)], strict=True))
     below = {tuple(matrices_on_host(quat[None])[0][2].round(3)) for quat in every}
     assert len(below) == len(quats)
+
+
+@pytest.mark.parametrize("stays", [True, False])
+def test_what_is_lost_while_its_container_is_opened_is_taken_again(monkeypatch, stays):
+    """A door that the other hand opens meets what the hand holds; `stays`: it is taken again and then kept."""
+    hands, taken = ["can"], []
+
+    class World(PlannedWorld):
+        held = property(lambda self: hands)  # pyright: ignore
+        facts = property(lambda self: None)  # pyright: ignore
+
+    def find(world, predicate, step, hand, opened, until):
+        yield []
+        if stays and taken:
+            return (None, types.SimpleNamespace(drop=0.0)), ()
+        hands[0] = ""
+        return placing._NO_WAY, ()
+
+    def grasp(world, step):
+        yield []
+        hands[0] = step.object
+        taken.append(step.object)
+        return Outcome()
+
+    def nothing(*_):
+        yield []
+        return ""
+
+    world = object.__new__(World)
+    world.domain = types.SimpleNamespace(hands_for=lambda name: 1)  # pyright: ignore
+    changes = {
+        "_find": find, "grasp": grasp, "go": nothing, "set_upright": nothing, "from_home": lambda *_: nothing(),
+        "letting_go": lambda *_, falls: [], "put_there": lambda *_: (True, ""),
+    }  # fmt: skip
+    for name, change in changes.items():
+        monkeypatch.setattr(placing, name, change)
+    running = placing.place("inside")(world, Step("place_inside", ("can", "cabinet")))
+    with pytest.raises(StopIteration) as ended:
+        while True:
+            next(running)
+    outcome = ended.value.value
+    assert outcome.done == stays and len(taken) == (1 if stays else 3)
+    assert stays or (outcome.reason, outcome.detail) == ("slipped", "the hand lost can")

@@ -103,6 +103,9 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                     righted = True
                     if (yield from set_upright(world, where)):
                         continue
+                if name not in world.held:  # a hand that opened something for it, or set that up, has met it
+                    reason, detail = "slipped", f"the hand lost {name}"
+                    continue
                 if found == _NO_WAY and not turned_over and (yield from regrasp(world, name, hand)):
                     turned_over = True
                     continue
