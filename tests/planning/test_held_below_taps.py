@@ -23,6 +23,7 @@ class Carrying(PlannedWorld):
         self.body, self._corners = body, GRIP + np.array([[-0.05, -0.05, -below], [0.05, 0.05, above]])
 
     held = property(lambda self: ["vase"])  # pyright: ignore
+    base = property(lambda self: (np.zeros(2), 0.0))  # pyright: ignore
     grip = lambda self, hand: GRIP  # noqa: E731  # pyright: ignore
     vertices = lambda self, name: self._corners  # noqa: E731  # pyright: ignore
 
