@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from ig2mj.errors import InputError
 from ig2mj.files.heartbeat import Heartbeat, is_alive
-from ig2mj.files.unfinished import unfinished
+from ig2mj.files.unfinished import replacing
 
 #: A folder that holds this file is an earlier output and may be replaced.
 MARK = "manifest.json"
@@ -56,9 +56,8 @@ def put_shared_file(file: pathlib.Path, content: bytes) -> None:
             return
     except FileNotFoundError:
         file.parent.mkdir(parents=True, exist_ok=True)
-    part = unfinished(file)
-    part.write_bytes(content)
-    part.replace(file)
+    with replacing(file) as part:
+        part.write_bytes(content)
 
 
 def _check(target: pathlib.Path) -> None:

@@ -23,8 +23,9 @@ from ig2mj.tasks.bddl.binding import BindingError
 from ig2mj.tasks.bddl.task import bddl_task
 from ig2mj.tasks.experts.quarters import quarter_turn, turned_view
 from ig2mj.tasks.homes import check_inside, in_home
+from ig2mj.tasks.household import Household
 from ig2mj.tasks.registry import load_task
-from ig2mj.tasks.relocation import Household, reason_against
+from ig2mj.tasks.relocation import reason_against
 
 COOKING = ACTIVITIES["CookingMeat"]
 

@@ -183,3 +183,9 @@ class Seeing:
 
     def __init__(self, looks: str):
         self.sensor_options = SensorOptions(looks=looks)
+
+
+def test_a_card_says_in_words_what_differs_between_episodes():
+    assert shipped._varied("objects,lights") == "objects, lights"
+    given = '{"objects": true, "lights": false,\n"materials": {"colour": [0.5, 1.6]}, "robot_start": {"shift": 0.25}}'
+    assert shipped._varied(given) == "objects, materials (colour 0.5 to 1.6), robot_start (shift 0.25)"

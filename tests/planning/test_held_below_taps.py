@@ -78,3 +78,69 @@ def test_what_is_lost_on_the_way_to_a_tap_is_taken_again(monkeypatch, losses):
         while True:
             next(running)
     assert ended.value.value.done and len(taken) == losses
+
+
+@pytest.mark.parametrize("cleared", [True, False])
+def test_what_is_lost_while_a_basin_is_cleared_is_taken_again(monkeypatch, cleared):
+    world: Any = SimpleNamespace(held=["cup", ""], index=lambda name: 0, base=(np.zeros(2), 0.0))
+    world.facts = SimpleNamespace(holds=lambda *condition: True)
+    calls = []
+
+    def grasp(world, step):
+        calls.append("grasp")
+        world.held[0] = "cup"
+        yield []
+        return Outcome()
+
+    def hold_at(world, name, hand, holds):
+        yield []
+        return ("", [np.zeros(3)], 0) if calls else ("no_path", [], -1)
+
+    def clear_basin(world, source, moved):
+        yield []
+        world.held[:] = ["", ""]
+        return cleared
+
+    def regrasp(world, name, hand):
+        raise AssertionError("no hand holds it")
+        yield
+
+    monkeypatch.setattr(grasping, "grasp", grasp)
+    for name, stand_in in (("hold_at", hold_at), ("clear_basin", clear_basin), ("regrasp", regrasp)):
+        monkeypatch.setattr(taps, name, stand_in)
+    monkeypatch.setattr(taps, "wait_until", lambda *given: iter(()))
+    monkeypatch.setattr(taps, "source_of", lambda world, tap: np.zeros(3))
+    monkeypatch.setattr(taps, "carry", lambda world, hand: None)
+    running = taps.hold_below_tap(world, "cup", "sink", lambda hand, source: [], ("soaked", "cup"), 1.0)
+    with pytest.raises(StopIteration) as ended:
+        while True:
+            next(running)
+    assert ended.value.value.done and calls == ["grasp"]
+
+
+@pytest.mark.parametrize("opened", [True, False])
+def test_what_is_put_down_for_a_free_hand_is_taken_again_whatever_came_of_it(monkeypatch, opened):
+    world: Any = SimpleNamespace(held=["rag"])
+
+    def release(world, step):
+        world.held[0] = ""
+        yield []
+        return Outcome()
+
+    def grasp(world, step):
+        world.held[0] = step.object
+        yield []
+        return Outcome()
+
+    def action():
+        assert world.held == [""]
+        yield []
+        return opened
+
+    monkeypatch.setattr(grasping, "release", release)
+    monkeypatch.setattr(grasping, "grasp", grasp)
+    running = grasping.with_free_hand(world, action())
+    with pytest.raises(StopIteration) as ended:
+        while True:
+            next(running)
+    assert ended.value.value is opened and world.held == ["rag"]

@@ -144,9 +144,9 @@ def test_what_is_tiny_lies_below_the_fingers_of_a_palm_from_above_and_not_below_
     which, found = grasps._under_fingers(bean, points, fingers, palms)
     assert which.tolist() == [*[0] * count, *[1] * count, 2]
     assert np.allclose(found[[0, count, -1]], [behind[0], behind[1], points[2]])
-    beside = found[1:3] - behind[0]
-    assert np.allclose(beside @ fingers[0], 0.0) and np.allclose(beside @ palms[0], 0.0)
-    assert np.allclose(beside.sum(0), 0.0) and not np.allclose(beside[0], 0.0)
+    aside = found[1:3] - behind[0]
+    assert np.allclose(aside @ fingers[0], 0.0) and np.allclose(aside @ palms[0], 0.0)
+    assert np.allclose(aside.sum(0), 0.0) and not np.allclose(aside[0], 0.0)
     which, found = grasps._under_fingers(stick, points, fingers, palms)
     along = len(grasps.OFF_SLENDER)
     assert which.tolist() == [*[0] * along, *[1] * count, 2]

@@ -66,7 +66,7 @@ def test_libraries_that_are_there_already_stay():
     assert "mujoco.mjx" in imported(code + "from mujoco.mjx._src import mesh; assert mesh.trimesh is before")
 
 
-def test_devices_are_found_beside_imports_and_whoever_asks_is_told_what_is_wrong():
+def test_devices_are_found_during_imports_and_every_caller_is_told_what_is_wrong():
     code = """
 import threading, time
 from ig2mj.process.imports import find_devices

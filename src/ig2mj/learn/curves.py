@@ -44,6 +44,6 @@ class Curves:
             return SummaryWriter(str(self._folder), flush_secs=10)
         except ModuleNotFoundError:
             print("no TensorBoard file: the package tensorboardX is not installed", file=sys.stderr)
-        except Exception as e:  # in a thread nobody else would say it; the run and `progress.csv` go on
+        except Exception as e:  # a thread's error is said nowhere else; the run and `progress.csv` go on
             print(f"no TensorBoard file: {e}", file=sys.stderr)
         return None

@@ -28,7 +28,7 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError, InputError, PolicyMismatch
 from ig2mj.files.content import decode_json
 from ig2mj.files.npz import read_npz, write_npz
-from ig2mj.files.unfinished import unfinished
+from ig2mj.files.unfinished import replacing
 from ig2mj.learn.action_distributions import mode, sample
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.networks import ActorNetwork, apply_with_memory, conv_encoder
@@ -216,14 +216,12 @@ class Policy:
         """Writes it. Raises OSError."""
         half = {f"weights/{name}": np.asarray(w, np.float16) for name, w in self.weights.items()}
         path = pathlib.Path(file)
-        partial = unfinished(path)
-        with partial.open("wb") as f:
+        with replacing(path) as part, part.open("wb") as f:
             card = np.frombuffer(json.dumps(self.card).encode(), np.uint8)
             scales = {"mean": self.mean, "deviation": self.deviation}
             if self.hidden is not None:
                 scales |= dict(zip(HIDDEN, self.hidden, strict=True))
             write_npz(f, {CARD: card, **scales, **half})
-        partial.replace(path)
 
     @classmethod
     def load(cls, file: str | os.PathLike) -> Policy:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ig2mj.errors import InputError
 from ig2mj.files.npz import read_npz
-from ig2mj.files.unfinished import unfinished
+from ig2mj.files.unfinished import replacing
 from ig2mj.looks.materials import Material, texels
 from ig2mj.looks.mesh import Triangles
 from ig2mj.process.compilation import cache_folder
@@ -88,7 +88,7 @@ def _read(file: pathlib.Path) -> Decoration | None:
         shapes, numbers = arrays["shapes"], arrays["numbers"]
         rows = {name: arrays[name] for name in _ARRAYS}
         images = arrays["images"]
-    except (InputError, KeyError, TypeError, ValueError):  # not written to its end, or somebody changed it
+    except (InputError, KeyError, TypeError, ValueError):  # not written to its end, or changed since
         return None
     count = len(materials)
     if shapes.shape != (count, 2) or numbers.shape != (count, 2) or images.dtype != np.uint8:
@@ -122,13 +122,8 @@ def _write(file: pathlib.Path, decoration: Decoration) -> None:
     }
     with contextlib.suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        part = unfinished(file)
-        try:
-            with part.open("wb") as opened:
-                np.savez(opened, allow_pickle=False, **arrays)
-            part.replace(file)  # others read all of it or nothing
-        finally:
-            part.unlink(missing_ok=True)
+        with replacing(file) as part, part.open("wb") as opened:
+            np.savez(opened, allow_pickle=False, **arrays)
         old = sorted(file.parent.glob("*.npz"), key=lambda other: other.stat().st_mtime)[:-KEPT]
         for other in old:
             other.unlink(missing_ok=True)

@@ -24,7 +24,7 @@ from ig2mj.planning.cleaning_strokes import (
     turn_about,
 )
 from ig2mj.planning.driving import go
-from ig2mj.planning.grasping import grasp, held_again, put_down_others, set_aside
+from ig2mj.planning.grasping import grasp, held_again, put_down_others, with_free_hand
 from ig2mj.planning.handing_over import hand_over
 from ig2mj.planning.moves import (
     UP,
@@ -147,9 +147,7 @@ def _opened(world: PlannedWorld, name: str, tool: str, opened: Tried) -> Generat
     if not bars(world, name, opened):
         return False
     yield from put_down_others(world, tool)
-    aside = yield from set_aside(world)
-    moved = yield from open_around(world, name, opened)
-    return not aside or ((yield from held_again(world, tool)) and moved)
+    return (yield from with_free_hand(world, open_around(world, name, opened)))
 
 
 def _clear_away(
@@ -173,9 +171,12 @@ def _clear_away(
     other = min(near)[1]
     moved.add(other)
     yield from put_down_others(world, tool)
-    aside = yield from set_aside(world)
-    yield from bring_out(world, other)
-    return not aside or (yield from held_again(world, tool))
+    yield from with_free_hand(world, _brought_out(world, other))
+    return True
+
+
+def _brought_out(world: PlannedWorld, name: str) -> Generator[Program, str, bool]:
+    return (yield from bring_out(world, name)).done
 
 
 def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Program:

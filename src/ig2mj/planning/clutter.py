@@ -12,7 +12,7 @@ from jaxtyping import Float
 from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.footprint import LOWEST
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor, Point
-from ig2mj.planning.grasping import held_again, set_aside
+from ig2mj.planning.grasping import with_free_hand
 from ig2mj.planning.moves import PrimitiveFailed, Program
 from ig2mj.planning.placing import bring_out
 from ig2mj.planning.pushing import push_aside
@@ -43,9 +43,7 @@ def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, 
     name = lying_upon(world, step) if name is None else name
     if name is None:
         return False
-    aside = yield from set_aside(world)
-    moved = yield from _moved(world, step, name)
-    return moved and (not aside or (yield from held_again(world, aside)))
+    return (yield from with_free_hand(world, _moved(world, step, name)))
 
 
 def _moved(world: PlannedWorld, step: Step, name: str) -> Generator[Program, str, bool]:

@@ -55,9 +55,11 @@ def _through_doors(world: PlannedWorld, step: Step, action: Action) -> Primitive
             outcome = yield from action(world, step)
             continue
         aside = (yield from set_aside(world)) if isinstance(world.body, HandedBody) else ""
-        if (detail := (yield from _swing(world, door, step))) is not None:
+        detail = yield from _swing(world, door, step)
+        held = not aside or (yield from held_again(world, aside))
+        if detail is not None:
             return dataclasses.replace(outcome, reason="no_path", detail=f"{door} is shut in the way{detail}")
-        if aside and not (yield from held_again(world, aside)):
+        if not held:
             return dataclasses.replace(outcome, reason="slipped", detail=f"{aside} was put down to open {door}")
         outcome = yield from action(world, step)
     return outcome

@@ -143,6 +143,15 @@ def set_aside(world: PlannedWorld) -> Generator[Program, str, str]:
     return name
 
 
+def with_free_hand(world: PlannedWorld, action: Generator[Program, str, bool]) -> Generator[Program, str, bool]:
+    """Does something that needs a free hand; where none is free, what one holds is put down and taken again. Returns
+    whether it was done, and the hand has again what it held."""
+    aside = yield from set_aside(world)
+    done = yield from action
+    held = not aside or (yield from held_again(world, aside))
+    return done and held
+
+
 def _off_furniture(world: PlannedWorld) -> Generator[Program, str, None]:
     """Hands let go of doors and drawers: one that ran into a drawer has lost what it held, and closed on that."""
     for hand, name in enumerate(world.held):

@@ -80,8 +80,8 @@ TINY, BEHIND_TINY = 0.05, 0.04
 
 OFF_TINY = ((BEHIND_TINY, 0.0), (BEHIND_TINY, 0.02), (BEHIND_TINY, -0.02), (0.065, 0.0), (0.085, 0.0))
 OFF_SLENDER = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02), (0.0, 0.03), (0.0, -0.03))
-"""m by which a palm is behind what is tiny, or lies along the fingers and is as narrow, and beside it, the best first:
-next to a wall it lies below the outer fingers, or their tips."""
+"""m by which a palm is behind what is tiny, or lies along the fingers and is as narrow, and to its side, the best
+first: next to a wall it lies below the outer fingers, or their tips."""
 
 MIDDLES = 8
 """Pieces whose middles are aimed at, at most."""
@@ -277,9 +277,9 @@ def _under_fingers(
     tiny, slender = low & ahead, low & ~ahead & aside
     which, offset = [np.flatnonzero(~tiny & ~slender)], [np.zeros((int((~tiny & ~slender).sum()), 3))]
     for kind, offsets in ((tiny, OFF_TINY), (slender, OFF_SLENDER)):
-        for behind, beside in offsets:
+        for behind, side in offsets:
             which.append(np.flatnonzero(kind))
-            offset.append((beside * across - behind * fingers)[kind])
+            offset.append((side * across - behind * fingers)[kind])
     order = np.argsort(np.concatenate(which), kind="stable")
     which = np.concatenate(which)[order]
     return which, points[which] + np.concatenate(offset)[order]

@@ -70,7 +70,7 @@ out of the way."""
 
 AT_END = 0.9
 """Share of its range from which on a door is not opened further: at last it is opened to its end, where its leaf stands
-beside what it shuts and leaves the robot room in front of that."""
+next to what it shuts and leaves the robot room in front of that."""
 
 LIFTED, HOOKED = 0.2, 12
 """Share of its range from which on a lid's inner face is pushed; agent steps in which fingers get below its edge."""

@@ -2,7 +2,7 @@
 
 A gripper with assisted grasping holds what a finger presses on and a ray from one finger to the other meets. What is
 wider than the fingers open, and so thin that no finger gets below it, as a cloth or a book that lies flat, is taken by
-an edge: one finger stands beside it, the other, raised by a tilt of the gripper, is above it.
+an edge: one finger stands next to it, the other, raised by a tilt of the gripper, is above it.
 
 Axes: N, M poses, V corners.
 """
@@ -24,7 +24,7 @@ OUTWARD, TILTS = 16, (0.25, 0.45)
 """Horizontal directions in which edges are looked for, and rad by which a gripper is tilted over one."""
 
 BESIDE, ABOVE_SUPPORT, DEEP = 0.008, 0.003, 0.025
-"""m from an edge to the inner face of the finger beside it, from the finger's lowest point to what the object lies on,
+"""m from an edge to the inner face of the finger next to it, from the finger's lowest point to what the object lies on,
 and below the object's top that this finger reaches at most."""
 
 AT_EDGE, LONG = 0.012, 0.06
@@ -91,13 +91,13 @@ def over_edges(
         length = float(ends[1] - ends[0])
         lowest = max(bottom + ABOVE_SUPPORT, top - DEEP)
         for share in THIRDS if length > LONG else THIRDS[:1]:
-            beside = (sum(ends) / 2 + share * length) * along + (outermost + BESIDE) * out
+            outside = (sum(ends) / 2 + share * length) * along + (outermost + BESIDE) * out
             for tilt in TILTS:
                 finger = np.sin(tilt) * UP - np.cos(tilt) * out
                 palm = -np.cos(tilt) * UP - np.sin(tilt) * out
                 hand = gripper(finger, palm)
                 tip = float((hand @ palm).max()) * palm - opening / 2 * finger  # of the outer finger's inner face
-                at = beside - (tip - tip[2] * UP) + (lowest - float(hand[:, 2].min())) * UP
+                at = outside - (tip - tip[2] * UP) + (lowest - float(hand[:, 2].min())) * UP
                 points.append(at)
                 fingers.append(finger)
                 palms.append(palm)

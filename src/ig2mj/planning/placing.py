@@ -14,7 +14,7 @@ from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.clearance import HELD, Obstacles, straight
 from ig2mj.planning.driving import go
-from ig2mj.planning.grasping import grasp, held_again, is_graspable, set_aside
+from ig2mj.planning.grasping import grasp, is_graspable, with_free_hand
 from ig2mj.planning.moves import (
     ATTEMPTS,
     LET_GO,
@@ -238,9 +238,7 @@ def _opened(world: PlannedWorld, where: str, opened: Tried) -> Generator[Program
     """As `open_into`; where no hand is free, what one holds is put down for it."""
     if not is_shut(world, where, opened):
         return False
-    aside = yield from set_aside(world)
-    moved = yield from open_into(world, where, opened)
-    return moved and (not aside or (yield from held_again(world, aside)))
+    return (yield from with_free_hand(world, open_into(world, where, opened)))
 
 
 def set_upright(world: PlannedWorld, where: str) -> Generator[Program, str, bool]:

@@ -46,7 +46,7 @@ def hold_below_tap(
         reason, way, number = yield from hold_at(world, name, hand, left)
         if reason == "slipped" and name not in world.held:
             continue
-        if number < 0 and (yield from clear_basin(world, source, moved)) and name in world.held:
+        if number < 0 and ((yield from clear_basin(world, source, moved)) or name not in world.held):
             continue
         if number < 0 and not again and (yield from regrasp(world, name, hand)):  # by another side
             again = True

@@ -16,7 +16,7 @@ import numpy as np
 
 from ig2mj.errors import InputError
 from ig2mj.files.npz import read_npz
-from ig2mj.files.unfinished import unfinished
+from ig2mj.files.unfinished import replacing
 from ig2mj.process.compilation import cache_folder
 
 Hull = tuple[np.ndarray, np.ndarray]
@@ -80,10 +80,5 @@ def _write(file: pathlib.Path, hulls: list[Hull]) -> None:
     }
     with contextlib.suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        part = unfinished(file)
-        try:
-            with part.open("wb") as opened:
-                np.savez(opened, allow_pickle=False, **arrays)
-            part.replace(file)  # others read all of it or nothing
-        finally:
-            part.unlink(missing_ok=True)
+        with replacing(file) as part, part.open("wb") as opened:
+            np.savez(opened, allow_pickle=False, **arrays)

@@ -21,7 +21,7 @@ import jax
 import numpy as np
 
 from ig2mj.errors import InputError
-from ig2mj.files.unfinished import unfinished
+from ig2mj.files.unfinished import replacing
 from ig2mj.process.compilation import cache_folder
 from ig2mj.process.program_cache import say_not_kept
 from ig2mj.scene.scene import Scene
@@ -140,9 +140,8 @@ def different_rows(one: Pool, other: Pool) -> list[int]:
 def file_of_bytes(content: bytes, file: pathlib.Path) -> None:
     """Puts a file that another process read in its place: never half of one, even if several processes do."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    part = unfinished(file)
-    part.write_bytes(content)
-    part.replace(file)
+    with replacing(file) as part:
+        part.write_bytes(content)
 
 
 def _tried(file: pathlib.Path) -> int:

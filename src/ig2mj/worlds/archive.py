@@ -17,7 +17,7 @@ import numpy as np
 from ig2mj.errors import InputError
 from ig2mj.files.content import decode_struct
 from ig2mj.files.npz import read_npz, refuse_nonfinite, write_npz
-from ig2mj.files.unfinished import unfinished
+from ig2mj.files.unfinished import replacing
 
 HEADER = "header"
 
@@ -32,12 +32,10 @@ def save_tree(file: str | os.PathLike, tree: Any, header: dict[str, Any]) -> Non
     """
     path = pathlib.Path(file)
     packed = pack(tree, header)
-    part = unfinished(path)
     try:
-        part.write_bytes(packed)
-        part.replace(path)
+        with replacing(path) as part:
+            part.write_bytes(packed)
     except OSError as e:
-        part.unlink(missing_ok=True)
         raise InputError(path, f"cannot be written: {e.strerror or e}", fix="choose another place") from e
 
 
