@@ -33,8 +33,9 @@ class _World(PlannedWorld):
         return np.array([0.0, 0.51, 1.05])
 
 
-def test_an_arm_carries_a_board_that_reaches_ahead_of_the_hand_near_the_body():
-    assert _World(0.1).carry(0)[0] == pytest.approx(TRUNK + BODY_SPARE + 0.01)
+def test_an_arm_carries_a_board_farther_from_the_body_that_reaches_back_from_the_hand():
+    """The hand turns with it on its way, so that it has half its width at least."""
+    assert _World(0.1).carry(0)[0] == pytest.approx(TRUNK + BODY_SPARE + 0.4 / np.sqrt(2))
     assert _World(None).carry(0)[0] == pytest.approx(TRUNK + BODY_SPARE + 0.4 / np.sqrt(2))
     behind = np.array([0.0, 0.9, 1.05])
     assert _World(0.1, held="").carry(0, "board", behind)[0] == pytest.approx(TRUNK + BODY_SPARE + 0.4)

@@ -323,8 +323,8 @@ class PlannedWorld:
 
     def carry(self, hand: int, name: str = "", grip: Vector | None = None) -> Vector:
         """Where a hand carries an object, "": what it holds, in the body's frame: as far ahead as that is wide, on an
-        arm as far as it reaches back from the hand, and, if the hand floats, so high that what hangs below it passes
-        over counters.
+        arm farther where it reaches back farther from the hand, and, if the hand floats, so high that what hangs below
+        it passes over counters.
 
         Args:
           grip: where a hand on an arm will hold the object, that is where it is now; None: where it holds it.
@@ -337,7 +337,7 @@ class PlannedWorld:
             back, yaw = half, self.base[1]
             if self.body.opening is not None and (grip is not None or self.held[hand] == name):
                 offset = (self.grip(hand) if grip is None else grip) - corners
-                back = float((offset[:, :2] @ (np.cos(yaw), np.sin(yaw))).max())
+                back = max(half, float((offset[:, :2] @ (np.cos(yaw), np.sin(yaw))).max()))
             x = max(x, self.body.trunk[0] + BODY_SPARE + back)
             y = 0.0 if half > WIDE and self.body.opening is None else y  # the middle of the way through a door
             if self.body.opening is None and self.held[hand] == name and self.held.count(name) == 1:
