@@ -8,11 +8,13 @@ import pytest
 
 import ig2mj
 from ig2mj.agents import Humanoid
+from ig2mj.geometry.host_rotations import quat_multiply, yaw_quat
 from ig2mj.planning import execution
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles, hand_way
 from ig2mj.planning.driving import stretch
 from ig2mj.planning.phases import Phase, Programs
+from ig2mj.planning.senses import sense
 from ig2mj.planning.stances import reaching_all
 from ig2mj.planning.world import PlannedWorld, Stance
 from ig2mj.sampling.query import SceneQuery
@@ -22,35 +24,35 @@ from ig2mj.sampling.query import SceneQuery
 def robot(tiny_home_folder):
     scene = ig2mj.load_scene(tiny_home_folder, agents=[Humanoid().at(-0.45, 0.0, 0.0)])
     controller = scene.agents[0].controller(scene.tables, 0, 0.1)
-    return body_of(scene, controller), controller.action_names.index("body_z"), SceneQuery(scene).view
+    return body_of(scene, controller), controller.action_names, SceneQuery(scene).view
 
 
 def test_the_body_rises_and_stays_there_in_the_next_program(robot):
-    body, height, view = robot
+    body, names, view = robot
     carry = execution.begin([[stretch(0.2)]])
     action, carry = execution.advance(body, 0, carry, view)
-    assert action[0, height] == pytest.approx(0.05) and carry.running.all()
+    assert action[0, names.index("body_z")] == pytest.approx(0.05) and carry.running.all()
     carry = execution.begin_some(carry, {0: [Phase(hand=0, reset=True)]})
     action, carry = execution.advance(body, 0, carry, view)
-    assert action[0, height] == pytest.approx(0.05)
+    assert action[0, names.index("body_z")] == pytest.approx(0.05)
 
 
 def test_the_body_stays_stretched_where_an_earlier_program_was_longer(robot):
-    body, height, view = robot
+    body, names, view = robot
     carry = execution.begin([[Phase(limit=1, after="")] * 5])
     carry = execution.begin_some(carry, {0: [dataclasses.replace(stretch(0.2), limit=1)]})
     while carry.running.all():
         _, carry = execution.advance(body, 0, carry, view)
     carry = execution.begin_some(carry, {0: [Phase(hand=0, reset=True)]})
     action, carry = execution.advance(body, 0, carry, view)
-    assert action[0, height] == pytest.approx(0.05)
+    assert action[0, names.index("body_z")] == pytest.approx(0.05)
 
 
 def test_the_body_stays_at_its_height_where_nothing_else_is_asked(robot):
-    body, height, view = robot
+    body, names, view = robot
     carry = execution.begin([[Phase(hand=0, reset=True)]])
     action, _ = execution.advance(body, 0, carry, view)
-    assert action[0, height] == pytest.approx(0.0, abs=0.01)
+    assert action[0, names.index("body_z")] == pytest.approx(0.0, abs=0.01)
     assert np.isnan(Programs.pack([[Phase()]]).rise).all()
 
 
@@ -103,3 +105,38 @@ def test_the_body_stretches_as_little_as_it_takes_to_reach_all_points():
         away = [np.linalg.norm(world.shoulder(0, found) - p) for p in points]
         assert max(away) <= world.body.reach + 1e-9 and np.isclose(max(away), world.body.reach)
     assert reached(low, high) is None and reached((1.3, 0.0, 0.9)) is None
+
+
+class _Standing(PlannedWorld):
+    """A robot with room above it."""
+
+    def __init__(self, body):
+        self.body = body
+
+
+def test_a_hand_reaches_what_lies_far_below_a_bed(robot):
+    body, _, _ = robot
+    world, can = _Standing(body), np.array([1.28, 0.0, 0.06])
+    back, aside, _ = body.shoulders[0]
+    found = reaching_all(world, 0, Stance((0.0, 0.0), -float(np.arctan2(aside, back))), can[None], _Roof())
+    assert found is not None and np.linalg.norm(world.shoulder(0, found) - can) <= body.reach + 1e-9
+    assert body.stands + found.rise > 0.0
+
+
+@pytest.mark.parametrize("laden", [False, True])
+def test_a_hand_that_follows_late_with_what_it_holds_comes_to_rest(robot, laden):
+    body, names, view = robot
+    senses, late, turned = sense(view, 0, body.hands), 2 * laden, [0.0] * 3
+    yaw = names.index("left_hand_yaw")
+    held = np.array(senses.held)
+    held[0, 0, 0] = laden
+    quat = senses.hand_quat[0, 0]
+    w, x, y, z = map(float, quat_multiply(yaw_quat(0.5), quat))
+    phase = Phase(hand=0, quat=(w, x, y, z))
+    rows = Programs.pack([[phase]]).at(np.zeros(1, int))
+    for _ in range(40):
+        hands = np.array(senses.hand_quat)
+        hands[0, 0] = quat_multiply(yaw_quat(turned[-1 - late]), quat)
+        now = dataclasses.replace(senses, hand_quat=hands, held=held)
+        turned.append(turned[-1] + float(body.command(now, rows)[0, yaw]))
+    assert np.allclose(turned[-6:], 0.5, atol=0.02)
