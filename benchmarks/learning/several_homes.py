@@ -61,7 +61,7 @@ def pools(args: argparse.Namespace) -> list[dict[str, Any]]:
 
 def experts(args: argparse.Namespace) -> list[dict[str, Any]]:
     """One job for each activity, robot and home."""
-    homes = (*TRAIN_HOMES, *HELD_OUT_HOMES)
+    homes = args.homes or (*TRAIN_HOMES, *HELD_OUT_HOMES)
     robots = [(task, robot) for task in args.tasks for robot in ACTIVITIES[task].robots]
     return [{"what": "experts", "task": t, "robot": r, "home": h, "rows": args.rows} for t, r in robots for h in homes]
 
@@ -179,6 +179,7 @@ def main() -> None:
     parser.add_argument("kind", choices=KINDS)
     parser.add_argument("--tasks", nargs="+", default=["CookingMeat", "GraspingBook"])
     parser.add_argument("--rows", type=int, default=ROWS)
+    parser.add_argument("--homes", nargs="+", help='of experts; "birch:1" is the second place of birch')
     parser.add_argument("--worlds", type=int, default=8192, help="of throughput: all worlds together")
     parser.add_argument("--together", action="store_true", help="of axes: only none and all of them")
     parser.add_argument("--jobs", type=int, default=1)

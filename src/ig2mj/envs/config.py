@@ -161,7 +161,8 @@ class EnvConfig:
         its own start states.
       home: a home in place of the task's, by name or folder: any with a floor map for navigation, any that the
         activity can be bound in for BDDL, and one with the furniture that the task needs for the paper's activities
-        (`ig2mj.tasks.relocation`). A list: several at once (`ig2mj.make`).
+        (`ig2mj.tasks.relocation`), which may have several places there: "birch:1" is the second. A list: several at
+        once (`ig2mj.make`).
       objects: what is added to the home, folders that `ig2mj convert object` wrote or names of the object library, each
         with a place if it has one (`ig2mj.load_scene`). In the paper's activities and in tasks of your own,
         "obj/mug@on_top:breakfast_table_0" is a further condition of the start states: the mug is in another place in

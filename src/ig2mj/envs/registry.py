@@ -52,7 +52,7 @@ from ig2mj.tasks.custom.code import TaskCode
 from ig2mj.tasks.custom.definition import Definition, task_of
 from ig2mj.tasks.custom.files import import_files, task_of_file
 from ig2mj.tasks.custom.objective import CustomObjective
-from ig2mj.tasks.homes import AnyTask, in_home
+from ig2mj.tasks.homes import AnyTask, in_home, written_home
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.objective import Objective
 from ig2mj.tasks.own_goal import goal_task, split_goal_name
@@ -177,7 +177,8 @@ def make(
       action_space: "continuous", or "primitives": a `ig2mj.envs.primitives.PrimitiveEnv`, a Gymnasium environment whose
         arguments the overrides then are.
 
-    `homes`: "train" or "held_out", the homes of that set that the task fits into (`ig2mj.tasks.splits`), or a list.
+    `homes`: "train" or "held_out", the homes of that set that the task fits into (`ig2mj.tasks.splits`), or a list, in
+    which "birch:1" is the second place in birch where one of the paper's activities can be done.
     With several homes, also as `home=[...]`, worlds are shared out evenly, and the result is a `HomesEnvironment`.
 
     Returns:
@@ -348,7 +349,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         whole_actions=whole,
         # Of a BDDL activity fewer rows than asked for may be good, and its robot stands where the first row wants it.
         pool_size=pool_size if isinstance(task, BddlTask) else rows,
-        home=None if config.home is None else task.home,
+        home=None if config.home is None else written_home(task, config.home),
         objects=objects,
     )
     return Environment(

@@ -33,6 +33,7 @@ from ig2mj.process import entry_point
 from ig2mj.tasks.homes import AnyTask
 from ig2mj.tasks.relocation import reason_against, renamed
 from ig2mj.tasks.splits import HELD_OUT_HOMES, TRAIN_HOMES, Split
+from ig2mj.tasks.spots import home_and_place
 from ig2mj.tasks.task import Task
 from ig2mj.worlds.random_streams import LARGEST
 
@@ -76,14 +77,15 @@ class HomesEnvironment:
     (`task`, `robot`, `action_space`, ...).
 
     Attributes:
-      envs: of the homes. homes: their names. num_worlds: W. privileged_names: of ground truth.
+      envs: of the homes. homes: their names, with the number of the place where it is not the first. num_worlds: W.
+      privileged_names: of ground truth.
     """
 
     def __init__(self, envs: Sequence[Environment]):
         """Raises EngineError: there is no home, or actions or observations differ between two homes."""
         if not envs:
             raise EngineError("homes: name at least one")
-        self.envs, self.homes = tuple(envs), tuple(env.scene.name for env in envs)
+        self.envs, self.homes = tuple(envs), tuple(map(_label, envs))
         first = envs[0]
         for env in envs[1:]:
             for what, mine, other in (
@@ -167,6 +169,13 @@ class HomesEnvironment:
         """See `Environment.close`."""
         for env in self.envs:
             env.close()
+
+
+def _label(env: Environment) -> str:
+    """The name of an environment's home, with the number of the place there."""
+    home = env.config.home
+    place = home_and_place(home)[1] if isinstance(home, str) else 0
+    return f"{env.scene.name}:{place}" if place else env.scene.name
 
 
 def _seen(state: EnvState) -> tuple[Any, ...]:

@@ -35,12 +35,14 @@ from ig2mj.learn.shipped import find_policy
 from ig2mj.scene.paths import shipped_homes
 from ig2mj.scene.scene import check_looks
 from ig2mj.sensors.base import CAMERA_LOOKS
+from ig2mj.tasks.spots import home_and_place
 from ig2mj.worlds.randomize import Randomize
 
 
 def _checked_home(name: str) -> str:
-    """A home's name or folder. Raises UnknownNameError: there is no such home."""
-    if name not in (homes := shipped_homes()) and not pathlib.Path(name).exists():
+    """A home's name or folder, or a place there. Raises UnknownNameError: there is no such home."""
+    home, _ = home_and_place(name)
+    if home not in (homes := shipped_homes()) and not pathlib.Path(home).exists():
         raise UnknownNameError("home or set of homes", name, (*HOMES, *homes))
     return name
 
@@ -97,7 +99,8 @@ class RunSettings:
       doors: whether doors between rooms stand "open" or "shut" at the start of episodes.
       horizon: agent steps of an episode; 0: those of the demonstrations, else the task's.
       relaxed_thresholds: the success thresholds of the paper's experiments.
-      homes: "train", or names of homes with commas: worlds are shared out over them; "": the task's own.
+      homes: "train", or names of homes with commas, also with the number of a place ("birch:1"): worlds are shared out
+        over them; "": the task's own.
       homes_in_turn: an iteration steps the worlds of one of several homes, in turn (sac and dagger, where worlds divide
         evenly over homes); false: of all of them.
       randomize: axes of `ig2mj.Randomize` with commas, "all", or axes with their settings as JSON, such as

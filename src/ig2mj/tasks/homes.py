@@ -19,6 +19,7 @@ from ig2mj.tasks.bddl.binding import bind
 from ig2mj.tasks.bddl.task import BddlTask
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.relocation import home_name, relocated
+from ig2mj.tasks.spots import home_and_place
 from ig2mj.tasks.task import Task
 
 DOORWAY = 0.3
@@ -30,19 +31,29 @@ AnyTask = Task | NavigationTask | BddlTask
 def in_home(task: AnyTask, home: str | os.PathLike) -> AnyTask:
     """The task in another home: a folder of a converted scene, or the name of a home that ships.
 
+    Activities of the paper also at another place of it, such as "birch:1" (`ig2mj.tasks.relocation`).
+
     Navigation goes into any home with a map of its floor. What BDDL defines is bound to the home's objects again.
-    Activities of the paper: `ig2mj.tasks.relocation.relocated`.
 
     Raises:
       InputError: there is no such home. BindingError: it lacks what the activity needs. EngineError: the activity's
         furniture is not there, or elsewhere.
     """
+    name, place = home_and_place(home)
+    if place and not isinstance(task, Task):
+        raise EngineError(f"place {place} of '{name}' for {task.name}: only the paper's activities have several places")
     if isinstance(task, BddlTask):
         binding = bind(task.binding.activity, load_manifest(scene_folder(home)))
         return dataclasses.replace(task, binding=dataclasses.replace(binding, home=home_name(home)))
     if isinstance(task, Task):
         return relocated(task, home)
     return dataclasses.replace(task, home=home_name(home))
+
+
+def written_home(task: AnyTask, asked: str | os.PathLike) -> str:
+    """The home that `in_home` puts a task into, as it takes it. `asked`: what it was given."""
+    place = home_and_place(asked)[1]
+    return f"{task.home}:{place}" if place else task.home
 
 
 def check_inside(task: str, scene: Scene) -> None:

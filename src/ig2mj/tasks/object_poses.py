@@ -28,7 +28,7 @@ from ig2mj.sampling.conditions import read_conditions
 from ig2mj.scene.scene import Scene
 from ig2mj.tasks.household import SITS, Household
 from ig2mj.tasks.pools import COUNT, bare_scene, pool_of, start_states
-from ig2mj.tasks.relocation import ENOUGH, MARGIN, STEP
+from ig2mj.tasks.spots import ENOUGH, MARGIN, STEP
 from ig2mj.tasks.task import Task
 from ig2mj.worlds.pool import Pool, stack
 
