@@ -26,6 +26,7 @@ from ig2mj.tasks.homes import check_inside, in_home
 from ig2mj.tasks.household import Household
 from ig2mj.tasks.registry import load_task
 from ig2mj.tasks.relocation import reason_against
+from ig2mj.tasks.task import Task
 
 COOKING = ACTIVITIES["CookingMeat"]
 
@@ -135,6 +136,40 @@ def test_where_objects_start_is_in_view():
     off = points[:, :2] - moved.robots["humanoid"].pos[:2]
     ahead, left = off @ [np.cos(yaw), np.sin(yaw)], off @ [-np.sin(yaw), np.cos(yaw)]
     assert np.mean(np.abs(left) < ahead) > 0.65
+
+
+def side_of_stove(task: Task) -> float:
+    """m to the left of the humanoid where the burners are, in the home that a task is in."""
+    acts, yaw = task.robots["humanoid"], np.radians(task.robots["humanoid"].yaw)
+    off = Household(bare_scene(task.home)).link("stove_0", COOKING.fit.link) - acts.pos
+    return float(off[:2] @ [-np.sin(yaw), np.cos(yaw)])
+
+
+@pytest.mark.parametrize("home", ["birch", "spruce"])
+def test_a_home_has_further_places_at_other_furniture(home):
+    """Counters on the left and on the right of the stove: at the second place the robot turns the other way."""
+    first, second = in_home(COOKING, home), in_home(COOKING, f"{home}:1")
+    assert second.home == first.home == home and first.start != second.start
+    assert second.roles["bottom_cabinet_1"] != first.roles.get("bottom_cabinet_1", "bottom_cabinet_1")
+    assert side_of_stove(first) < -0.4 and side_of_stove(second) > 0.4
+    scene = load_scene(home, agents=[Humanoid(pos=second.robots["humanoid"].pos)], objects=second.objects)
+    assert ncon_of_robot(scene) == 0
+    with pytest.raises(EngineError, match=f"place 2 of CookingMeat in '{home}': it can be done at 2 places, 0 to 1"):
+        in_home(COOKING, f"{home}:2")
+
+
+def test_homes_with_one_place_say_so():
+    with pytest.raises(EngineError, match="place 1 of CookingMeat in 'juniper': it can be done at one place"):
+        in_home(COOKING, "juniper:1")
+    with pytest.raises(EngineError, match="only the paper's activities have several places"):
+        in_home(load_task("PointNavigation"), "birch:1")
+    assert in_home(COOKING, "birch:0") == COOKING
+
+
+def test_a_folder_may_be_named_as_a_place_is(tmp_path, monkeypatch):
+    shutil.copytree(scene_folder("small_home"), tmp_path / "mine:1", symlinks=True)
+    monkeypatch.chdir(tmp_path)
+    assert in_home(load_task("PointNavigation"), "mine:1").home == str(tmp_path / "mine:1")
 
 
 def ncon_of_robot(scene) -> int:

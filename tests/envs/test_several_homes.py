@@ -76,6 +76,16 @@ def test_worlds_are_shared_out_over_homes_and_step_as_alone(env):
 
 
 @pytest.mark.slow
+def test_two_places_of_a_home_are_two_parts():
+    """They are made again from what they say they were made with."""
+    settings = {"engine": "native", "pool_size": 2, "observations": "privileged_state"}
+    env = ig2mj.make("CookingMeat", worlds=2, home=["birch", "birch:1"], **settings)
+    assert env.homes == ("birch", "birch:1") and [e.config.home for e in env.envs] == ["birch", "birch:1"]
+    again = ig2mj.make("CookingMeat", env.envs[1].config)
+    assert again.task == env.envs[1].task and again.task.roles["bottom_cabinet_1"] == "bottom_cabinet_0"
+
+
+@pytest.mark.slow
 def test_ground_truth_is_named_by_the_part_that_objects_play():
     settings = {"engine": "native", "pool_size": 2, "observations": "privileged_state"}
     env = ig2mj.make("CookingMeat", worlds=1, home=["small_home"], **settings)

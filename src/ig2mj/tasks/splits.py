@@ -21,6 +21,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.tasks.spots import home_and_place
 
 TRAIN_HOMES = ("birch", "cedar", "alder", "larch", "linden", "maple", "rowan", "spruce")
 """Homes that policies are trained in."""
@@ -54,7 +55,8 @@ class Split:
 
     def check_home(self, home: object) -> None:
         """Raises EngineError: this home is not of the split, which says that homes are held out."""
-        if self.homes == "held_out" and home is not None and home not in HELD_OUT_HOMES:
+        name = home_and_place(home)[0] if isinstance(home, str) else home
+        if self.homes == "held_out" and home is not None and name not in HELD_OUT_HOMES:
             raise EngineError(
                 f"split='{self.name}' takes held-out homes ({', '.join(HELD_OUT_HOMES)}), and home='{home}' is none "
                 "(leave home out, or take split='held_out')"
