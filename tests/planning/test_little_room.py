@@ -21,6 +21,7 @@ from ig2mj.planning.pushing import _ways_aside
 from ig2mj.planning.spots import spots_upon
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
+from ig2mj.planning.taking import spheres_of
 from ig2mj.planning.world import AWAY, PlannedWorld
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.worlds.rules import Rules
@@ -73,6 +74,34 @@ def test_a_hand_goes_in_between_a_thing_and_what_is_above_it(world):
     assert nearest(0.3) == {grasps.BEFORE[0]}
     assert nearest(0.075) == {grasps.FLAT}
     assert nearest(0.05) == set()
+
+
+class _Slot(_Ceiling):
+    """A floor with two walls along x to both sides of a line, m."""
+
+    def __init__(self, inner: Obstacles, floor: float, middle: float, half: float):
+        super().__init__(inner, floor, np.inf)
+        self._middle, self._half = middle, half
+
+    def distance(self, points):
+        return np.minimum(super().distance(points), self._half - np.abs(points[..., 1] - self._middle))
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.02])
+def test_a_hand_almost_touches_walls_on_its_way_where_there_is_no_more_room(world, aside):
+    low, middle = float(world.vertices("book")[:, 2].min()), world.com("book")[1] + aside
+
+    def found(half, room):
+        poses = grasps.grasp_poses(world, "book", _Slot(world.obstacles(["book"]), low, middle, half), room)
+        return [p for p in poses if p.palm[2] < -0.9]
+
+    assert found(0.07, 1.0)
+    assert not found(0.05, 1.0)
+    narrow = found(0.05, grasps.AT_OBJECT)
+    assert narrow and all(p.room == grasps.AT_OBJECT for p in narrow)
+    assert any(abs(p.point[1] - middle) < 0.009 for p in narrow)
+    spheres = spheres_of(world, narrow[0])
+    assert np.allclose(spheres[:, 3], grasps.AT_OBJECT * world.spheres(narrow[0].fingers, narrow[0].palm)[:, 3])
 
 
 def test_the_body_turns_its_shoulder_to_what_is_hardly_in_reach(world):

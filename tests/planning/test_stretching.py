@@ -124,19 +124,17 @@ def test_a_hand_reaches_what_lies_far_below_a_bed(robot):
 
 
 @pytest.mark.parametrize("laden", [False, True])
-def test_a_hand_that_follows_late_with_what_it_holds_comes_to_rest(robot, laden):
+def test_a_hand_that_follows_late_with_what_it_carries_comes_to_rest(robot, laden):
     body, names, view = robot
     senses, late, turned = sense(view, 0, body.hands), 2 * laden, [0.0] * 3
     yaw = names.index("left_hand_yaw")
-    held = np.array(senses.held)
-    held[0, 0, 0] = laden
     quat = senses.hand_quat[0, 0]
     w, x, y, z = map(float, quat_multiply(yaw_quat(0.5), quat))
-    phase = Phase(hand=0, quat=(w, x, y, z))
+    phase = Phase(hand=0, quat=(w, x, y, z), keeps=0 if laden else -1)
     rows = Programs.pack([[phase]]).at(np.zeros(1, int))
     for _ in range(40):
         hands = np.array(senses.hand_quat)
         hands[0, 0] = quat_multiply(yaw_quat(turned[-1 - late]), quat)
-        now = dataclasses.replace(senses, hand_quat=hands, held=held)
+        now = dataclasses.replace(senses, hand_quat=hands)
         turned.append(turned[-1] + float(body.command(now, rows)[0, yaw]))
     assert np.allclose(turned[-6:], 0.5, atol=0.02)

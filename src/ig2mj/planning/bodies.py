@@ -44,8 +44,8 @@ TURN_STEP, HAND_TURN_STEP = 0.25, 0.2
 """rad in an agent step: of a base that moves sideways, and of a hand."""
 
 LADEN_TURN = 0.4
-"""Share of the turn that is left by which a hand that holds something is turned in an agent step: targets of hands add
-up, and what is heavy follows them late, so that with the whole turn it would swing."""
+"""Share of the turn that is left by which a hand that carries something is turned in an agent step: targets of hands
+add up, and what is heavy follows them late, so that with the whole turn it would swing."""
 
 GAIN, MOST = 1.2, 0.5
 """Of a wheeled base: command of its turning for each rad (1 is its greatest speed), and the greatest command of turning
@@ -372,7 +372,7 @@ class HoveringBody(_Body):
         move *= np.minimum(1.0, rows["speed"] / np.maximum(np.asarray(length(move)), 1e-6))[:, None]
         left = np.asarray(quat_to_rotation_vector(quat_multiply(required, quat_conjugate(quat))))
         turn = np.where(rows["turns"][:, None] > 0, np.asarray(quat_rotate_inverse(base, left)), 0.0)
-        turn *= np.where(senses.held[:, number].any(axis=-1), LADEN_TURN, 1.0)[:, None]
+        turn *= np.where(rows["keeps"] >= 0, LADEN_TURN, 1.0)[:, None]
         turn *= np.minimum(1.0, HAND_TURN_STEP / np.maximum(np.asarray(length(turn)), 1e-6))[:, None]
         return move, turn
 

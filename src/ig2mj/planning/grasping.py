@@ -12,7 +12,7 @@ from ig2mj.planning.cleaning_area import leaves_free
 from ig2mj.planning.clearance import Obstacles, straight
 from ig2mj.planning.driving import go
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
-from ig2mj.planning.grasps import GraspPose, grasp_poses, ordered
+from ig2mj.planning.grasps import AT_OBJECT, GraspPose, grasp_poses, ordered
 from ig2mj.planning.moves import (
     ATTEMPTS,
     OPENS,
@@ -35,7 +35,7 @@ from ig2mj.planning.opening import Tried, open_around
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.stances import reaching_all, stances
 from ig2mj.planning.steps import Outcome, Step
-from ig2mj.planning.taking import closing_on, entries, way_to
+from ig2mj.planning.taking import closing_on, entries, spheres_of, way_to
 from ig2mj.planning.two_hands import grasp_with_both, holds_with_both, release_with_both
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
 from ig2mj.scene.tables import LinkKind
@@ -103,6 +103,8 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         found = _plan(world, name, hand, tried, prefers)
         while found is None and (yield from open_around(world, name, moved)):
             found = _plan(world, name, hand, tried, prefers)
+        if found is None and world.body.opening is None:
+            found = _plan(world, name, hand, tried, prefers, AT_OBJECT)
         if found is None:
             reason, detail = "no_base", f"no free floor from which a hand has a way to {name}"
             if not tried and world.body.opening is not None and not grasp_poses(world, name, world.obstacles([name])):
@@ -214,11 +216,20 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
 
 
 def _plan(
-    world: PlannedWorld, name: str, hand: int, tried: Sequence[GraspPose], prefers: Prefers | None = None
+    world: PlannedWorld,
+    name: str,
+    hand: int,
+    tried: Sequence[GraspPose],
+    prefers: Prefers | None = None,
+    room: float = 1.0,
 ) -> tuple[Stance, GraspPose] | None:
-    """A stance and a pose from which the hand has a way, the most comfortable first; later attempts take others."""
+    """A stance and a pose from which the hand has a way, the most comfortable first; later attempts take others.
+
+    Args:
+      room: `GraspPose.room`.
+    """
     obstacles, floor = world.obstacles([name], stays=False), world.floor()
-    poses = [p for p in grasp_poses(world, name, obstacles) if not any(_alike(p, t) for t in tried)]
+    poses = [p for p in grasp_poses(world, name, obstacles, room) if not any(_alike(p, t) for t in tried)]
     if not poses:
         return None
     points, on_arm = np.array([p.point for p in poses]), world.body.opening is not None
@@ -240,7 +251,7 @@ def _plan(
 
     def has_way(candidate: tuple[Stance, GraspPose], search: bool) -> bool:
         stance, pose = candidate
-        spheres, goal, back = world.spheres(pose.fingers, pose.palm), pose.at(pose.before), entries(pose, stance.xy)
+        spheres, goal, back = spheres_of(world, pose), pose.at(pose.before), entries(pose, stance.xy)
         follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles, stance)
         rests, standing = world.resting(hand, stance), world.standing(obstacles, stance, hand)
         way = hand_path(standing, spheres, rests, goal, back, search=search, follows=follows)

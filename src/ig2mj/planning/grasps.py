@@ -80,8 +80,9 @@ TINY, BEHIND_TINY = 0.05, 0.04
 
 OFF_TINY = ((BEHIND_TINY, 0.0), (BEHIND_TINY, 0.02), (BEHIND_TINY, -0.02), (0.065, 0.0), (0.085, 0.0))
 OFF_SLENDER = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02), (0.0, 0.03), (0.0, -0.03))
-"""m by which a palm is behind what is tiny, or lies along the fingers and is as narrow, and to its side, the best
-first: next to a wall it lies below the outer fingers, or their tips."""
+OFF_FLAT = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02))
+"""m by which a palm is behind what is tiny, or lies along the fingers and is as narrow, or is wider and as low, and to
+its side, the best first: next to a wall it lies below the outer fingers, or their tips."""
 
 MIDDLES = 8
 """Pieces whose middles are aimed at, at most."""
@@ -96,6 +97,7 @@ class GraspPose:
       burden: how badly the object is held there: far from below its centre of mass, or so low that the hand is in the
         way when it is put down; 0 to 1.
       scrapes: fingers meet what is around the object, unless the object stops the hand before.
+      room: share of the spheres' radii that keeps clear of what is around on the hand's way.
       deep: m beyond the point that the hand goes for, until it touches the object.
     """
 
@@ -106,6 +108,7 @@ class GraspPose:
     burden: float = 0.0
     scrapes: bool = False
     deep: float = BELOW
+    room: float = 1.0
 
     def at(self, away: float) -> Vector:
         """A point above the surface, m along its normal."""
@@ -138,11 +141,11 @@ def sides() -> list[tuple[Vector, list[Vector]]]:
 _SIDES = sides()
 
 
-def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[GraspPose]:
+def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles, room: float = 1.0) -> list[GraspPose]:
     """Poses of a hand on an object with room for the hand there, from above first.
 
     Args:
-      obstacles: everything but the object.
+      obstacles: everything but the object. room: `GraspPose.room`.
     """
     tables, index = world.domain.model.tables, world.index(name)
     centre, corners = world.com(name), world.vertices(name)
@@ -194,7 +197,7 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     for away in (*BEFORE, FLAT) if body.opening is None else BEFORE:
         still = np.flatnonzero(before == 0.0)
         off = centres[still] - away * palms[still, None]
-        before[still[_room(obstacles, off, spheres[still, :, 3])]] = away
+        before[still[_room(obstacles, off, room * spheres[still, :, 3])]] = away
     lever = world.mass(name) * GRAVITY * np.linalg.norm((points - centre)[:, :2], axis=1)
     low = (points[:, 2] < corners[:, 2].min() + LOW) & (np.abs(palms[:, 2]) < UPRIGHT)
     burden = np.minimum(lever / MOST_TORQUE, 1.0) + low
@@ -205,7 +208,7 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles) -> list[Gr
     first = np.unique(which[good], return_index=True)[1]  # of poses that differ by where the fingers are
     return [
         GraspPose(
-            points[k], fingers[k], palms[k], float(before[k]), min(float(burden[k]), 1.0), bool(s), float(deep[k])
+            points[k], fingers[k], palms[k], float(before[k]), min(float(burden[k]), 1.0), bool(s), float(deep[k]), room
         )
         for k, s in zip(good[first], scrapes[first], strict=True)
     ]
@@ -274,9 +277,9 @@ def _under_fingers(
     across = np.cross(fingers, palms)
     low, ahead, aside = (np.ptp(corners @ axes.T, axis=0) < TINY for axes in (palms, fingers, across))
     low &= palms[:, 2] < -UPRIGHT
-    tiny, slender = low & ahead, low & ~ahead & aside
-    which, offset = [np.flatnonzero(~tiny & ~slender)], [np.zeros((int((~tiny & ~slender).sum()), 3))]
-    for kind, offsets in ((tiny, OFF_TINY), (slender, OFF_SLENDER)):
+    tiny, slender, flat = low & ahead, low & ~ahead & aside, low & ~ahead & ~aside
+    which, offset = [np.flatnonzero(~low)], [np.zeros((int((~low).sum()), 3))]
+    for kind, offsets in ((tiny, OFF_TINY), (slender, OFF_SLENDER), (flat, OFF_FLAT)):
         for behind, side in offsets:
             which.append(np.flatnonzero(kind))
             offset.append((side * across - behind * fingers)[kind])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
 
 from ig2mj.planning.grasps import GraspPose
 from ig2mj.planning.moves import (
@@ -52,11 +53,16 @@ def closing_on(world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: 
 
 def way_to(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> list[Vector] | None:
     """The hand's way to before a grasp, from where the robot stands; None: there is none."""
-    obstacles, spheres = world.obstacles([name]), world.spheres(pose.fingers, pose.palm)
+    obstacles, spheres = world.obstacles([name]), spheres_of(world, pose)
     follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles)
     back = entries(pose, world.base[0])
     way = hand_path(obstacles, spheres, world.grip(hand), pose.at(pose.before), back, search=True, follows=follows)
     return way if goes_on(way, pose.at(0.0), follows) else None
+
+
+def spheres_of(world: PlannedWorld, pose: GraspPose) -> Float[np.ndarray, "S 4"]:
+    """What keeps clear about the grasp point of a hand on its way to a pose, m."""
+    return world.spheres(pose.fingers, pose.palm) * (1.0, 1.0, 1.0, pose.room)
 
 
 def entries(pose: GraspPose, xy: Sequence[float] | np.ndarray) -> list[Vector]:
