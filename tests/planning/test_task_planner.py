@@ -106,6 +106,25 @@ def test_the_only_hand_puts_down_a_tool_to_turn_a_tap_on(sampler, dirty, hands):
     assert steps == (soaks if hands == 2 else ["release sponge", soaks[0], "grasp sponge", *soaks[1:]])
 
 
+def test_the_only_hand_puts_down_what_it_switches_on(sampler, start):
+    for hands, steps in ((1, ["release stove", "toggle_on stove"]), (2, ["toggle_on stove"])):
+        planner = planner_of(sampler.model, "(toggled_on stove)", hands)
+        facts = SymbolicRung(planner.domain, sampler, [start]).facts(0)
+        facts.held = ("stove",)
+        assert [str(step) for step in planner.plan(facts).steps] == steps
+
+
+def test_the_only_hand_puts_what_must_not_be_on_the_floor_onto_a_support(sampler, start):
+    planner = planner_of(sampler.model, "(and (not (on_floor ball kitchen_0)) (open cabinet))", hands=1)
+    facts = SymbolicRung(planner.domain, sampler, [start]).facts(0)
+    facts.held = ("ball",)
+    put, opens = planner.plan(facts).steps
+    assert put.primitive == "place_on_top" and put.object == "ball" and str(opens) == "open cabinet"
+    gone = read_conditions(["(not (on_floor ball kitchen_0))"])[0]
+    assert put.serves == gone
+    assert str(planner.plan(facts, {gone: 6}).steps[0]) == "release ball"
+
+
 def test_what_failed_in_the_present_world_comes_after_the_rest(sampler, start):
     planner = planner_of(sampler.model, "(and (inside apple cabinet) (inside ball cabinet))")
     facts = SymbolicRung(planner.domain, sampler, [start]).facts(0)

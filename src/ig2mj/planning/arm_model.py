@@ -34,8 +34,9 @@ PULL = 0.5
 FASTEST, TURN_FASTEST = 0.04, 0.09
 """m and rad in an agent step that a hand on an arm is asked to move and turn by at most."""
 
-SEEDS, ITERATIONS = 8, 24
-"""Postures at which inverse kinematics begin, and their steps."""
+SEEDS, ITERATIONS = 24, 24
+"""Postures at which inverse kinematics begin, and their steps: of poses that Fetch's arm reaches, 92 % are found from 8
+postures, 99 % from 24, which take 1.7 ms in place of 1.2."""
 
 OFF, TURNED_OFF = 0.015, 0.12
 """m and rad from a pose within which a posture counts for it."""

@@ -46,6 +46,9 @@ UP, FORWARDS = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 EVERY = 4
 """Agent steps between the postures of a way whose links are checked."""
 
+POSTURES = 8
+"""In which the links of an arm are looked at that has its hand at a pose, at most."""
+
 ASIDE = 0.6
 """m that a base would like to be from what its arm does; less than the arm's reach by half."""
 
@@ -230,7 +233,7 @@ class ArmFollower:
     def reaches(self, point: Float[np.ndarray, "3"]) -> bool:
         """Whether there is a posture with the hand at a point of the world, clear of what is there."""
         found = self._model.solve(self._own(point[None])[0], self._quat, self._q)
-        return any(self._clear(q[None]) for q in found[:4])
+        return any(self._clear(q[None]) for q in found[:POSTURES])
 
     def __call__(self, points: Sequence[np.ndarray]) -> bool:
         """Whether the hand gets along points of the world from where it is, and the links have room."""

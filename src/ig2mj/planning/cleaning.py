@@ -75,7 +75,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
             return Outcome("no_grasp", f"{tool} is not soaked")
         if world.domain.has(tool, "toggleable") and not world.facts.holds("toggled_on", tool):
             yield from put_down_others(world, tool)
-            yield from toggle(True)(world, Step("toggle_on", (tool,)))
+            yield from with_free_hand(world, _switched_on(world, tool))  # the only hand lets go of it for that
         reason, detail, lost, tried = "no_base", f"no dirt of {name} is in reach", 0, collections.Counter[int]()
         visited, turned = list[Stance](), 0
         opened, moved, came = Tried(), set[str](), list[Vector]()
@@ -173,6 +173,10 @@ def _clear_away(
     yield from put_down_others(world, tool)
     yield from with_free_hand(world, _brought_out(world, other))
     return True
+
+
+def _switched_on(world: PlannedWorld, tool: str) -> Generator[Program, str, bool]:
+    return (yield from toggle(True)(world, Step("toggle_on", (tool,)))).done
 
 
 def _brought_out(world: PlannedWorld, name: str) -> Generator[Program, str, bool]:

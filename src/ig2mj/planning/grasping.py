@@ -62,8 +62,9 @@ ARM_ATTEMPTS = 8
 FIRM = 8
 """Agent steps in which fingers close firmly on what they hold by friction alone."""
 
-POSES, WAYS = 6, 120
-"""Poses that are tried from a stance, and ways of a hand that are looked for, at most."""
+POSES, WAYS, ARM_POSES, ARM_WAYS = 6, 120, 12, 360
+"""Poses that are tried from a stance, and ways of a hand that are looked for, at most, and those of a gripper on an
+arm, which has a posture for few of the poses that fit its object."""
 
 
 LOWER = 0.04
@@ -233,6 +234,7 @@ def _plan(
     if not poses:
         return None
     points, on_arm = np.array([p.point for p in poses]), world.body.opening is not None
+    count, most = (ARM_POSES, ARM_WAYS) if on_arm else (POSES, WAYS)
 
     def candidates() -> Iterator[tuple[Stance, GraspPose]]:
         aims = [world.com(name), *points[_spread(points, world.com(name))], _nearest(world, floor, points)]
@@ -247,7 +249,7 @@ def _plan(
                 if prefers is not None:
                     best.sort(key=_less_wanted(prefers))
                 near = ((_reaching(world, hand, stance, pose, obstacles), pose) for pose in best)
-                yield from itertools.islice(((at, pose) for at, pose in near if at is not None), POSES)
+                yield from itertools.islice(((at, pose) for at, pose in near if at is not None), count)
 
     def has_way(candidate: tuple[Stance, GraspPose], search: bool) -> bool:
         stance, pose = candidate
@@ -257,7 +259,7 @@ def _plan(
         way = hand_path(standing, spheres, rests, goal, back, search=search, follows=follows)
         return goes_on(way, pose.at(0.0), follows)
 
-    return first_way(candidates(), has_way, WAYS)
+    return first_way(candidates(), has_way, most)
 
 
 def _reaching(world: PlannedWorld, hand: int, stance: Stance, pose: GraspPose, obstacles: Obstacles) -> Stance | None:

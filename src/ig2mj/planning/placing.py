@@ -71,8 +71,9 @@ UNDER = 0.85
 """m, horizontal, that the base of hands that float would like to be from what is put below something: it is let down
 before that, and goes straight in."""
 
-STANCES, WAYS, ARM_WAYS = 3, 30, 200
-"""Stances for each spot, and ways of a hand that are looked for, at most: of one that floats, and of one on an arm."""
+STANCES, AROUND, WAYS, ARM_WAYS = 3, 12, 30, 200
+"""Stances for each spot, those among which they are looked for where a gripper has to point ahead, and ways of a hand
+that are looked for, at most: of one that floats, and of one on an arm."""
 
 
 def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[[PlannedWorld, Step], Primitive]:
@@ -345,7 +346,7 @@ def _plan(
       proposed: spots. search: ways are searched for where via points find none.
     """
     obstacles, floor = world.obstacles([name], stays=False), world.floor()
-    lacking, seen = _NO_SPOT, list[Stance]()
+    lacking, seen, floats = _NO_SPOT, list[Stance](), world.body.opening is None
 
     def spots() -> Iterator[tuple[Spot, Vector, np.ndarray]]:
         """Spots with room for the hand, with its grasp point and spheres; those above which the object is dropped come
@@ -376,13 +377,17 @@ def _plan(
             lacking = _NO_STANCE if lacking == _NO_WAY and not seen else lacking
             palm = world.hand_axes(hand, grip_for(world, hand, name, spot)[2])[1]
             away = world.away(spheres, palm)
-            if predicate == "under" and world.body.opening is None:
+            if predicate == "under" and floats:
                 away = max(away, UNDER)
-            for stance in stances(world, hand, target, floor, away, most=STANCES):
+            count = 0
+            for stance in stances(world, hand, target, floor, away, most=STANCES if floats else AROUND):
                 lacking = _NO_WAY
                 if points_ahead(world, palm, stance.yaw):
                     seen.append(stance)
                     yield stance, spot
+                    count += 1
+                if count == STANCES:
+                    break
 
     def has_way(candidate: tuple[Stance, Spot], search: bool) -> bool:
         stance, spot = candidate
@@ -394,5 +399,4 @@ def _plan(
         goal = target + (LET_GO + spot.drop) * UP
         return hand_path(standing, spheres, start, goal, back, SPARE, search, follows) is not None
 
-    most = WAYS if world.body.opening is None else ARM_WAYS
-    return first_way(candidates(), has_way, most, search) or lacking
+    return first_way(candidates(), has_way, WAYS if floats else ARM_WAYS, search) or lacking

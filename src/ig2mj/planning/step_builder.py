@@ -14,7 +14,7 @@ import numpy as np
 
 from ig2mj.planning.domain import SYMMETRIC, HeatSource
 from ig2mj.planning.facts import Facts
-from ig2mj.planning.step_order import LATER, ordered
+from ig2mj.planning.step_order import GIVE_UP, LATER, ordered
 from ig2mj.planning.steps import PLACE, Step
 from ig2mj.planning.supplies import RECEIVED, Supply, part_in, supplies
 from ig2mj.sampling.conditions import Condition
@@ -175,18 +175,30 @@ class StepBuilder:
         self._reach(name)
         if name not in self._held:
             self._free_hand(keep)
-            self._free_hand()  # of a robot with one hand, which takes what it keeps again
+        if name not in self._held or self._domain.hands == 1:
+            self._free_hand()  # of a robot with one hand, which takes what it keeps, or switches, again
         self._add("toggle_on" if value else "toggle_off", name)
         self._on[name] = value
 
     def _free_hand(self, keep: str = "", hands: int = 1) -> None:
-        """Puts down what is held longest, where fewer hands are free."""
+        """Puts down what is held longest, where fewer hands are free: what must not be on the floor, onto a support."""
         while self._domain.hands_taken(self._held) + hands > self._domain.hands:
             name = next((n for n in self._held if n != keep), "")
             if not name:
                 return
+            if (c := self._barred_floor(name)) is not None:
+                serves, self._serves = self._serves, c
+                self._away(name, c)
+                self._serves = serves
+                continue
             self._add("release", name)
             self._held.remove(name)
+
+    def _barred_floor(self, name: str) -> Condition | None:
+        """The condition of the reading that an object is not on the floor, which is true as long as a hand holds it;
+        None: there is none, or it cannot be put elsewhere."""
+        own = (w for w in self._required if (w.predicate, w.arguments[0], w.value) == ("on_floor", name, False))
+        return next((w for w in own if self._domain.supports and self._failed.get(w, 0) < GIVE_UP), None)
 
     def _take(self, name: str) -> None:
         if name in self._held:
