@@ -62,7 +62,7 @@ ARM_ATTEMPTS = 8
 FIRM = 8
 """Agent steps in which fingers close firmly on what they hold by friction alone."""
 
-POSES, WAYS, ARM_POSES, ARM_WAYS = 6, 120, 12, 360
+POSES, WAYS, ARM_POSES, ARM_WAYS = 6, 120, 24, 720
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most, and those of a gripper on an
 arm, which has a posture for few of the poses that fit its object."""
 
