@@ -138,6 +138,20 @@ def test_where_objects_start_is_in_view():
     assert np.mean(np.abs(left) < ahead) > 0.65
 
 
+def test_an_arm_stands_where_its_surface_is_not_on_its_right():
+    """Fetch stands farther to the right than the humanoid in juniper, and as at home elsewhere."""
+
+    def ahead_of(home):
+        moved = in_home(COOKING, home)
+        yaw = np.radians(moved.robots["fetch"].yaw)
+        off = np.subtract(moved.robots["fetch"].pos[:2], moved.robots["humanoid"].pos[:2])
+        return float(off @ [-np.sin(yaw), np.cos(yaw)])
+
+    at_home = COOKING.robots["humanoid"].pos[0] - COOKING.robots["fetch"].pos[0]
+    assert ahead_of("elm") == pytest.approx(at_home, abs=2e-3)
+    assert ahead_of("juniper") == pytest.approx(at_home - 0.2, abs=2e-3)
+
+
 def side_of_stove(task: Task) -> float:
     """m to the left of the humanoid where the burners are, in the home that a task is in."""
     acts, yaw = task.robots["humanoid"], np.radians(task.robots["humanoid"].yaw)

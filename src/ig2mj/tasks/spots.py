@@ -47,6 +47,10 @@ SEEN = 0.7
 ENOUGH = 24
 """Points of a surface in reach: 0.06 m2. With fewer, hardly any sampled state would count."""
 
+FOR_ARM = 0.12
+"""m to the right of an arm's base within which the middle of what is in reach lies. Fetch's gripper begins on its
+right: farther to that side, its forearm sweeps what it is to take."""
+
 ALIKE = 0.0
 """Likeness of spots that are further places of a home, at least."""
 
@@ -58,7 +62,8 @@ class Spot:
     Attributes:
       surface, anchor: objects of the home; anchor "" where none is needed. x, y: m. quarter: turns by 90 degrees of
         what the robot faces, from x. height: m of the floor there. top: m above the floor of the surface.
-      likeness: larger is more like the task's own home.
+      likeness: larger is more like the task's own home. arm: m further to the left where a robot stands that reaches
+        with an arm.
     """
 
     surface: str
@@ -69,6 +74,7 @@ class Spot:
     height: float
     top: float
     likeness: float
+    arm: float = 0.0
 
 
 @functools.lru_cache(maxsize=256)
@@ -94,7 +100,7 @@ def best_spot(name: str, fit: Fit, folder: str) -> Spot:
             f"{name} cannot be done in '{label}': nowhere on its free floor is a {' or '.join(fit.surfaces)} {words}"
             "within a robot's reach"
         )
-    return max(found, key=lambda spot: spot.likeness)
+    return _for_arm(home, fit, max(found, key=lambda spot: spot.likeness))
 
 
 def _points(low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"]) -> Float[np.ndarray, "N 3"]:
@@ -154,6 +160,21 @@ def _spots(home: Household, fit: Fit, anchor: str, surface: str, rank: int) -> I
                 yield spot
 
 
+def _shoulder(ahead: Float[np.ndarray, "3"], left: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """From a robot's middle to its shoulder."""
+    return SHOULDER[0] * ahead + SHOULDER[1] * left + np.array([0, 0, SHOULDER[2]])
+
+
+def _in_reach(
+    fit: Fit, off: Float[np.ndarray, "N 3"], ahead: Float[np.ndarray, "3"], left: Float[np.ndarray, "3"]
+) -> tuple[Bool[np.ndarray, "N"], Bool[np.ndarray, "N"]]:
+    """Which points count: those in reach before a robot, and all in reach. `off`: from its middle to them."""
+    in_reach = np.linalg.norm(off - _shoulder(ahead, left), axis=1) < fit.within
+    least, most = AHEAD
+    seen = (off @ ahead > least) & (off @ ahead < most) & (np.abs(off @ left) < ASIDE)
+    return seen & in_reach, in_reach
+
+
 def _judged(
     home: Household,
     fit: Fit,
@@ -168,14 +189,10 @@ def _judged(
     x, y, quarter = pose
     ahead, left = axes_of(quarter)
     here = np.array([x, y, 0.0])
-    shoulder = here + SHOULDER[0] * ahead + SHOULDER[1] * left + np.array([0, 0, SHOULDER[2]])
-    if target is not None and np.linalg.norm(target - shoulder) > fit.reach:
+    if target is not None and np.linalg.norm(target - here - _shoulder(ahead, left)) > fit.reach:
         return None
     off = points - here
-    least, most = AHEAD
-    seen = (off @ ahead > least) & (off @ ahead < most) & (np.abs(off @ left) < ASIDE)
-    in_reach = np.linalg.norm(points - shoulder, axis=1) < fit.within
-    near = seen & in_reach
+    near, in_reach = _in_reach(fit, off, ahead, left)
     if near.sum() < ENOUGH:
         return None
     visible = 1.0 if fit.on_floor else float(_in_view(off @ ahead, off @ left)[in_reach].mean())
@@ -190,6 +207,21 @@ def _judged(
     return Spot(
         surface, anchor, round(x, 3), round(y, 3), quarter, round(height, 3), round(float(points[0, 2]), 3), likeness
     )
+
+
+def _for_arm(home: Household, fit: Fit, spot: Spot) -> Spot:
+    """A spot with the place of an arm: the nearest to its right from where what is in reach is within `FOR_ARM`."""
+    if not spot.anchor or fit.link is None:
+        return spot
+    (ahead, left), here = axes_of(spot.quarter), np.array([spot.x, spot.y, 0.0])
+    off = _points(*home.box(spot.surface)) - here
+    aside = float((off[_in_reach(fit, off, ahead, left)[0]] @ left).mean())
+    target = home.link(spot.anchor, fit.link)
+    assert target is not None
+    shift = min(0.0, -STEP * np.ceil((-FOR_ARM - aside) / STEP))
+    reaches = abs((target - here) @ left - shift) < fit.aside
+    free = home.free((here + shift * left)[None, :2], 0.0)[0]
+    return dataclasses.replace(spot, arm=round(float(shift), 3)) if reaches and free else spot
 
 
 @functools.lru_cache(maxsize=256)
@@ -211,7 +243,7 @@ def further_spots(fit: Fit, folder: str, surface: str, anchor: str) -> tuple[Spo
         for a, s in [(a, s) for a in anchors for s in home.of(kind) if (s, a) != (surface, anchor)]:
             spots = [spot for side in sides for spot in _spots(home, side, a, s, rank)]
             if spots and (best := max(spots, key=lambda spot: spot.likeness)).likeness > ALIKE:
-                found.append(best)
+                found.append(_for_arm(home, fit, best))
     return tuple(sorted(found, key=lambda spot: -spot.likeness))
 
 
