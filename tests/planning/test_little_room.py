@@ -167,20 +167,26 @@ def test_what_is_tiny_lies_below_the_fingers_of_a_palm_from_above_and_not_below_
     fingers = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
     palms = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     points = np.zeros((3, 3))
-    bean = 0.01 * np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
-    stick = bean * (20.0, 1.0, 1.0)
+    bean = 0.02 * np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
+    stick = bean * (10.0, 1.0, 1.0)
     behind, count = -grasps.BEHIND_TINY * fingers, len(grasps.OFF_TINY)
-    which, found = grasps._under_fingers(bean, points, fingers, palms)
+    which, found, _ = grasps._under_fingers(bean, points, fingers, palms)
     assert which.tolist() == [*[0] * count, *[1] * count, 2]
     assert np.allclose(found[[0, count, -1]], [behind[0], behind[1], points[2]])
     aside = found[1:3] - behind[0]
     assert np.allclose(aside @ fingers[0], 0.0) and np.allclose(aside @ palms[0], 0.0)
     assert np.allclose(aside.sum(0), 0.0) and not np.allclose(aside[0], 0.0)
-    which, found = grasps._under_fingers(stick, points, fingers, palms)
+    which, found, swept = grasps._under_fingers(stick, points, fingers, palms)
     along = len(grasps.OFF_SLENDER)
     assert which.tolist() == [*[0] * along, *[1] * count, 2]
     assert np.allclose(found[[0, along, -1]], [points[0], behind[1], points[2]])
     assert np.allclose(found[:along] @ fingers[0], 0.0) and np.ptp(found[:along] @ fingers[1]) > 0.0
+    assert not swept.any()
+    which, found, swept = grasps._under_fingers(bean / 4, points, fingers, palms)
+    count = len(grasps.OFF_TINIEST)
+    assert which.tolist() == [*[0] * count, *[1] * count, 2] and swept.tolist() == [True] * 2 * count + [False]
+    assert np.allclose(found[swept, 2], grasps.SWEEPS - 0.005) and np.allclose(found[-1], points[2])
+    assert (found[:count] @ fingers[0] < -grasps.BEHIND_TINY).all()
 
 
 def test_what_slides_is_taken_by_its_sides_at_several_heights_and_places(world):

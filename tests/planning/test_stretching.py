@@ -3,16 +3,20 @@
 import dataclasses
 import types
 
+import mujoco
 import numpy as np
 import pytest
 
 import ig2mj
 from ig2mj.agents import Humanoid
+from ig2mj.agents.humanoid.frames import FINGER_CLOSED, FINGERS, SEGMENTS, THUMB_CLOSED
+from ig2mj.agents.humanoid.hand import RADIUS
 from ig2mj.geometry.host_rotations import quat_multiply, yaw_quat
 from ig2mj.planning import execution
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles, hand_way
 from ig2mj.planning.driving import stretch
+from ig2mj.planning.grasps import SWEEPS
 from ig2mj.planning.phases import Phase, Programs
 from ig2mj.planning.senses import sense
 from ig2mj.planning.stances import reaching_all
@@ -138,3 +142,31 @@ def test_a_hand_that_follows_late_with_what_it_carries_comes_to_rest(robot, lade
         now = dataclasses.replace(senses, hand_quat=hands)
         turned.append(turned[-1] + float(body.command(now, rows)[0, yaw]))
     assert np.allclose(turned[-6:], 0.5, atol=0.02)
+
+
+def test_fingers_that_close_step_by_step_sweep_what_is_below_the_palm(robot):
+    body, names, view = robot
+    rows = Programs.pack([[Phase(hand=1, close=True, closes=0.1)]]).at(np.zeros(1, int))
+    assert body.command(sense(view, 0, body.hands), rows)[0, names.index("right_hand_trigger")] == pytest.approx(0.1)
+    spec = mujoco.MjSpec()
+    Humanoid().attach(spec)
+    model = spec.compile()
+    data, name = mujoco.MjData(model), "humanoid_right_hand"
+    outer = [model.body(f"{name}_{finger}_middle").id for finger in FINGERS[1:]]
+    geoms = [g for g in range(model.ngeom) if model.geom_bodyid[g] in outer and model.geom_contype[g]]
+    deepest = []
+    for share in np.linspace(0.5, 1.0, 11):
+        for finger in FINGERS:
+            closed = THUMB_CLOSED if finger == "thumb" else FINGER_CLOSED
+            for segment in SEGMENTS:
+                data.joint(f"{name}_{finger}_{segment}_joint").qpos[0] = share * closed
+        mujoco.mj_kinematics(model, data)
+        palm = data.body(name).xpos + data.body(name).xmat.reshape(3, 3) @ body.grips[1]
+        down = data.body(name).xmat.reshape(3, 3)[:, 2]
+        ends = [
+            data.geom_xpos[g] + side * model.geom_size[g, 1] * data.geom_xmat[g].reshape(3, 3)[:, 2]
+            for g in geoms
+            for side in (1, -1)
+        ]
+        deepest.append(max(float((e - palm) @ down) for e in ends) + RADIUS[1])
+    assert SWEEPS < max(deepest) < SWEEPS + 0.01 and int(np.argmax(deepest)) < 10

@@ -297,7 +297,8 @@ class HoveringBody(_Body):
                 move = np.where(leads[:, None], self._hand(senses, rows, other)[0], move)
             action[:, self._places(*control.move)] = np.where((mine | follows)[:, None], move, 0.0)
             action[:, self._places(*control.turn)] = np.where(mine[:, None], turn, 0.0)
-            close = np.where(rows["close"] < 0, 0.0, np.where(rows["close"] > 0, -control.opens, control.opens))
+            closing = -control.opens * rows["closes"]
+            close = np.where(rows["close"] < 0, 0.0, np.where(rows["close"] > 0, closing, control.opens))
             action[:, self._places(control.close)] = np.where(mine | follows, close, 0.0)[:, None]
             reset = control.close.replace("trigger", "reset")
             if reset in self._names:

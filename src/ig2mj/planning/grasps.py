@@ -78,11 +78,17 @@ GRAVITY, MOST_TORQUE, BURDEN = 9.81, 6.0, 0.6
 TINY, BEHIND_TINY = 0.05, 0.04
 """m along palm and fingers up to which a thing is tiny, and by which a palm that floats is behind its middle then."""
 
+TINIEST, SWEEPS, STRAIGHT = 0.025, 0.07, 0.99
+"""m in each direction up to which closing fingers that lie on what a thing lies on close over it without touching it; m
+above that at which a palm is from which their tips sweep it towards the palm; vertical part of that palm's
+direction."""
+
+OFF_TINIEST = ((0.055, 0.0), (0.07, 0.0), (0.055, 0.015), (0.055, -0.015))
 OFF_TINY = ((BEHIND_TINY, 0.0), (BEHIND_TINY, 0.02), (BEHIND_TINY, -0.02), (0.065, 0.0), (0.085, 0.0))
 OFF_SLENDER = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02), (0.0, 0.03), (0.0, -0.03))
 OFF_FLAT = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02))
-"""m by which a palm is behind what is tiny, or lies along the fingers and is as narrow, or is wider and as low, and to
-its side, the best first: next to a wall it lies below the outer fingers, or their tips."""
+"""m by which a palm is behind what is tiniest, or tiny, or lies along the fingers and is as narrow, or is wider and as
+low, and to its side, the best first: next to a wall it lies below the outer fingers, or their tips."""
 
 MIDDLES = 8
 """Pieces whose middles are aimed at, at most."""
@@ -187,8 +193,8 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles, room: floa
         own = world.planner.obstacles(world.view, others, world.world)
         which, points, fingers, palms, deep = _of_gripper(body, own, trunk, points, fingers, palms)
     else:
-        which, points = _under_fingers(corners, points, fingers, palms)
-        fingers, palms, deep = fingers[which], palms[which], deep[which]
+        which, points, swept = _under_fingers(corners, points, fingers, palms)
+        fingers, palms, deep = fingers[which], palms[which], np.where(swept, 0.0, deep[which])
     if not len(points):
         return []
     spheres = np.stack([body.hand_spheres(f, p) for f, p in zip(fingers, palms, strict=True)])
@@ -266,10 +272,10 @@ def _under_fingers(
     points: Float[np.ndarray, "N 3"],
     fingers: Float[np.ndarray, "N 3"],
     palms: Float[np.ndarray, "N 3"],
-) -> tuple[Int[np.ndarray, "M"], Float[np.ndarray, "M 3"]]:
+) -> tuple[Int[np.ndarray, "M"], Float[np.ndarray, "M 3"], Bool[np.ndarray, "M"]]:
     """Points for a palm that comes from above, with the numbers of the poses from which they come: on what is tiny, so
     far behind it that it lies below the fingers. Below the palm, fingers that close are stopped by what it lies on
-    before they come to it.
+    before they come to it. What is tiniest is swept towards the palm; the last array says where.
 
     Args:
       corners: of the object.
@@ -277,15 +283,19 @@ def _under_fingers(
     across = np.cross(fingers, palms)
     low, ahead, aside = (np.ptp(corners @ axes.T, axis=0) < TINY for axes in (palms, fingers, across))
     low &= palms[:, 2] < -UPRIGHT
-    tiny, slender, flat = low & ahead, low & ~ahead & aside, low & ~ahead & ~aside
+    swept = (palms[:, 2] < -STRAIGHT) & bool((np.ptp(corners, axis=0) < TINIEST).all())
+    tiny, slender, flat = low & ahead & ~swept, low & ~ahead & aside, low & ~ahead & ~aside
+    kinds = (swept, OFF_TINIEST), (tiny, OFF_TINY), (slender, OFF_SLENDER), (flat, OFF_FLAT)
     which, offset = [np.flatnonzero(~low)], [np.zeros((int((~low).sum()), 3))]
-    for kind, offsets in ((tiny, OFF_TINY), (slender, OFF_SLENDER), (flat, OFF_FLAT)):
+    for kind, offsets in kinds:
         for behind, side in offsets:
             which.append(np.flatnonzero(kind))
             offset.append((side * across - behind * fingers)[kind])
     order = np.argsort(np.concatenate(which), kind="stable")
     which = np.concatenate(which)[order]
-    return which, points[which] + np.concatenate(offset)[order]
+    found = points[which] + np.concatenate(offset)[order]
+    found[swept[which], 2] = corners[:, 2].min() + SWEEPS
+    return which, found, swept[which]
 
 
 def _fingers_have_room(

@@ -54,6 +54,7 @@ class Phase:
       hand: number of the robot's hand that acts, -1: none. pos: m of its grasp point; None: it stays in the body's
         frame. quat: orientation of the hand, w-x-y-z; None: any. in_body: both are in the frame of the robot's base.
       reset: the hand goes back to where it rests. close: True: the hand closes, False: it opens, None: as it is.
+      closes: share of its way by which a floating hand closes in an agent step.
       until: what ends the phase. object: number of the object that this is about.
       keeps: number of an object that must stay in the hand, else the phase fails as "slipped"; -1: none.
       tolerance, turn_tolerance: m and rad within which base and hand are there.
@@ -73,6 +74,7 @@ class Phase:
     in_body: bool = False
     reset: bool = False
     close: bool | None = None
+    closes: float = 1.0
     until: Until = Until.THERE
     object: int = -1
     keeps: int = -1
@@ -106,6 +108,7 @@ class Programs:
     in_body: Int[np.ndarray, "W P"]
     reset: Int[np.ndarray, "W P"]
     close: Int[np.ndarray, "W P"]
+    closes: Float[np.ndarray, "W P"]
     until: Int[np.ndarray, "W P"]
     object: Int[np.ndarray, "W P"]
     keeps: Int[np.ndarray, "W P"]
@@ -139,6 +142,7 @@ class Programs:
             in_body=column(lambda p: p.in_body, np.int32),
             reset=column(lambda p: p.reset, np.int32),
             close=column(lambda p: -1 if p.close is None else int(p.close), np.int32),
+            closes=column(lambda p: p.closes, np.float32),
             until=column(lambda p: p.until, np.int32),
             object=column(lambda p: p.object, np.int32),
             keeps=column(lambda p: p.keeps, np.int32),

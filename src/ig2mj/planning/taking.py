@@ -26,6 +26,10 @@ from ig2mj.planning.moves import (
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.world import PlannedWorld, Vector
 
+SWEEPING = 0.1
+"""Share of its way by which a hand closes in an agent step that sweeps something towards its palm: at once, the fingers
+would knock it away."""
+
 
 def closing_on(world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: Sequence[Vector]) -> Program:
     """The hand goes along a way to before a grasp, on until it touches the object, and closes until it holds it."""
@@ -41,6 +45,13 @@ def closing_on(world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: 
         after="",
         speed=COMING,
     )
+    if pose.deep <= 0.0:  # fingers sweep it towards the palm
+        return [
+            *travel(hand, way, quat),
+            Phase(hand=hand, pos=deep, quat=quat, tolerance=0.004, limit=25, after="", speed=TOUCHING),
+            Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, closes=SWEEPING,
+                  limit=int(2 / SWEEPING), after="no_grasp", speed=CLOSING),
+        ]  # fmt: skip
     return [
         *travel(hand, way, quat),
         *([near] if thin else []),
