@@ -47,12 +47,13 @@ def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, 
 
 
 def _moved(world: PlannedWorld, step: Step, name: str) -> Generator[Program, str, bool]:
-    """Puts a thing elsewhere, or pushes it aside; returns whether it did."""
+    """Puts a thing elsewhere, or pushes it aside where hands do not take it; returns whether it did."""
     try:
-        if world.domain.graspable(name):
-            return (yield from bring_out(world, name)).done
+        if world.domain.graspable(name) and (yield from bring_out(world, name)).done:
+            return True
         point = target_of(world, step)
-        assert point is not None  # else nothing was in the way
+        if point is None or name in world.held or clutter_in_the_way(world, step) != name:
+            return False  # what lies upon something is not pushed
         others, reach = [n for n in _loose(world, step) if n != name], _nearer(world, step, point)
         opens = lambda floor: nearest_floor(world, floor, point, reach) is not None  # noqa: E731
         return (yield from push_aside(world, name, opens, others))

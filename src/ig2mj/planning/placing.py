@@ -14,7 +14,7 @@ from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.clearance import HELD, Obstacles, straight
 from ig2mj.planning.driving import go
-from ig2mj.planning.grasping import grasp, is_graspable, with_free_hand
+from ig2mj.planning.grasping import grasp, is_graspable, release, with_free_hand
 from ig2mj.planning.moves import (
     ATTEMPTS,
     LET_GO,
@@ -110,6 +110,11 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 if found == _NO_WAY and not turned_over and (yield from regrasp(world, name, hand)):
                     turned_over = True
                     continue
+                if predicate == "on_floor" and world.facts.room(name) == where and name in world.held:
+                    yield from release(world, Step("release", (name,)))  # where the robot stands, in that room
+                    placed, detail = put_there(world.facts, step, until or predicate)
+                    if placed and not detail:
+                        return Outcome(attempts=attempt + 1)
                 break
             stance, spot = found
             if reason := (yield from go(world, stance)):
