@@ -1,0 +1,89 @@
+"""What is done where a hand has no way: put down where the robot stands, and pushed where it cannot be taken."""
+
+import types
+
+import pytest
+
+from ig2mj.planning import clutter, placing
+from ig2mj.planning.steps import Outcome, Step
+from ig2mj.planning.world import PlannedWorld
+
+
+def ended(running):
+    """What a generator returns; its programs succeed."""
+    with pytest.raises(StopIteration) as end:
+        while True:
+            next(running)
+    return end.value.value
+
+
+class World(PlannedWorld):
+    """A hand holds a book; rooms are asked for at `room`."""
+
+    room = "kitchen_0"
+    held = property(lambda self: self.__dict__["holding"])  # pyright: ignore
+    facts = property(lambda self: types.SimpleNamespace(room=lambda name: self.room))  # pyright: ignore
+
+
+def world_in(room: str, graspable: bool = True) -> World:
+    found = object.__new__(World)
+    found.__dict__["holding"], found.room = ["book"], room
+    found.domain = types.SimpleNamespace(  # pyright: ignore
+        hands_for=lambda name: 1, graspable=lambda name: graspable, loose=["book", "rug"]
+    )
+    return found
+
+
+@pytest.mark.parametrize(("predicate", "room", "lets_go"), [
+    ("on_floor", "kitchen_0", True), ("on_floor", "bath_0", False), ("on_top", "kitchen_0", False),
+])  # fmt: skip
+def test_what_has_no_way_to_its_place_on_a_floor_is_let_go_in_that_room_and_nothing_else(
+    monkeypatch, predicate, room, lets_go
+):
+    world = world_in(room)
+
+    def find(*_):
+        yield []
+        return placing._NO_WAY, ()
+
+    def no(*_):
+        yield []
+        return False
+
+    def release(world, step):
+        yield []
+        world.held.remove(step.object)
+        return Outcome()
+
+    for name, change in {"_find": find, "set_upright": no, "regrasp": no, "release": release}.items():
+        monkeypatch.setattr(placing, name, change)
+    monkeypatch.setattr(placing, "put_there", lambda *_: (True, ""))
+    outcome = ended(placing.place(predicate)(world, Step(f"place_{predicate}", ("book", "kitchen_0"))))
+    assert outcome.done == lets_go and world.held == ([] if lets_go else ["book"])
+    assert lets_go or outcome.reason == "no_path"
+
+
+@pytest.mark.parametrize(("graspable", "taken", "pushed"), [(True, True, 0), (True, False, 1), (False, False, 1)])
+def test_what_cannot_be_taken_out_of_the_way_is_pushed_aside(monkeypatch, graspable, taken, pushed):
+    world, pushes = world_in("kitchen_0", graspable), []
+    world.held.clear()
+
+    def bring_out(world, name):
+        yield []
+        return Outcome("" if taken else "no_base")
+
+    def push_aside(world, name, opens, others):
+        yield []
+        pushes.append((name, others))
+        return True
+
+    monkeypatch.setattr(clutter, "bring_out", bring_out)
+    monkeypatch.setattr(clutter, "push_aside", push_aside)
+    monkeypatch.setattr(clutter, "target_of", lambda *_: (0.0, 0.0, 0.0))
+    monkeypatch.setattr(clutter, "_nearer", lambda *_: 1.0)
+    monkeypatch.setattr(clutter, "clutter_in_the_way", lambda *_: "rug")
+    assert ended(clutter._moved(world, Step("grasp", ("cup",)), "rug"))
+    assert pushes == [("rug", ["book"])] * pushed
+    monkeypatch.setattr(clutter, "clutter_in_the_way", lambda *_: None)  # it lies upon the cup
+    assert ended(clutter._moved(world, Step("grasp", ("cup",)), "rug")) == taken
+    assert len(pushes) == pushed
