@@ -55,3 +55,9 @@ def test_a_hand_prefers_palm_down_and_fingers_ahead():
 
 def test_spheres_of_a_hand_are_larger_than_points_of_what_it_holds():
     assert (hand_spheres((1.0, 0.0, 0.0), (0.0, 0.0, -1.0))[:, 3] > HELD).all()
+
+
+def test_what_is_swept_is_as_comfortable_from_above_as_anything_else():
+    from_above = GraspPose(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0]), 0.12, deep=0.0)
+    sloped = GraspPose(np.zeros(3), np.array([0.7, 0.0, 0.7]), np.array([0.7, 0.0, -0.7]), 0.12)
+    assert ordered([sloped, from_above], 0.0)[0] is from_above

@@ -182,8 +182,9 @@ def test_what_is_tiny_lies_below_the_fingers_of_a_palm_from_above_and_not_below_
     assert np.allclose(found[[0, along, -1]], [points[0], behind[1], points[2]])
     assert np.allclose(found[:along] @ fingers[0], 0.0) and np.ptp(found[:along] @ fingers[1]) > 0.0
     assert not swept.any()
-    which, found, swept = grasps._under_fingers(bean / 4, points, fingers, palms)
-    count = len(grasps.OFF_TINIEST)
+    half_a_nut = bean * (0.9, 0.7, 0.25)
+    which, found, swept = grasps._under_fingers(half_a_nut, points, fingers, palms)
+    count = len(grasps.OFF_SWEPT)
     assert which.tolist() == [*[0] * count, *[1] * count, 2] and swept.tolist() == [True] * 2 * count + [False]
     assert np.allclose(found[swept, 2], grasps.SWEEPS - 0.005) and np.allclose(found[-1], points[2])
     assert (found[:count] @ fingers[0] < -grasps.BEHIND_TINY).all()

@@ -78,17 +78,17 @@ GRAVITY, MOST_TORQUE, BURDEN = 9.81, 6.0, 0.6
 TINY, BEHIND_TINY = 0.05, 0.04
 """m along palm and fingers up to which a thing is tiny, and by which a palm that floats is behind its middle then."""
 
-TINIEST, SWEEPS, STRAIGHT = 0.025, 0.07, 0.99
-"""m in each direction up to which closing fingers that lie on what a thing lies on close over it without touching it; m
+FLATTEST, SWEEPS, STRAIGHT = 0.025, 0.07, 0.99
+"""m of height up to which closing fingers that lie on what a tiny thing lies on close over it without touching it; m
 above that at which a palm is from which their tips sweep it towards the palm; vertical part of that palm's
 direction."""
 
-OFF_TINIEST = ((0.055, 0.0), (0.07, 0.0), (0.055, 0.015), (0.055, -0.015))
+OFF_SWEPT = ((0.055, 0.0), (0.07, 0.0), *((0.055, side) for side in (0.015, -0.015, 0.025, -0.025, 0.032, -0.032)))
 OFF_TINY = ((BEHIND_TINY, 0.0), (BEHIND_TINY, 0.02), (BEHIND_TINY, -0.02), (0.065, 0.0), (0.085, 0.0))
-OFF_SLENDER = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02), (0.0, 0.03), (0.0, -0.03))
+OFF_SLENDER = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02), (0.0, 0.03), (0.0, -0.03), (0.0, 0.036), (0.0, -0.036))
 OFF_FLAT = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02))
-"""m by which a palm is behind what is tiniest, or tiny, or lies along the fingers and is as narrow, or is wider and as
-low, and to its side, the best first: next to a wall it lies below the outer fingers, or their tips."""
+"""m by which a palm is behind what is tiny and flat, or tiny, or lies along the fingers and is as narrow, or is wider
+and as low, and to its side, the best first: next to a wall it lies below the outer fingers, or their tips."""
 
 MIDDLES = 8
 """Pieces whose middles are aimed at, at most."""
@@ -275,7 +275,7 @@ def _under_fingers(
 ) -> tuple[Int[np.ndarray, "M"], Float[np.ndarray, "M 3"], Bool[np.ndarray, "M"]]:
     """Points for a palm that comes from above, with the numbers of the poses from which they come: on what is tiny, so
     far behind it that it lies below the fingers. Below the palm, fingers that close are stopped by what it lies on
-    before they come to it. What is tiniest is swept towards the palm; the last array says where.
+    before they come to it. What is flat, too, is swept towards the palm; the last array says where.
 
     Args:
       corners: of the object.
@@ -283,9 +283,9 @@ def _under_fingers(
     across = np.cross(fingers, palms)
     low, ahead, aside = (np.ptp(corners @ axes.T, axis=0) < TINY for axes in (palms, fingers, across))
     low &= palms[:, 2] < -UPRIGHT
-    swept = (palms[:, 2] < -STRAIGHT) & bool((np.ptp(corners, axis=0) < TINIEST).all())
+    swept = (palms[:, 2] < -STRAIGHT) & bool((np.ptp(corners, axis=0) < (TINY, TINY, FLATTEST)).all())
     tiny, slender, flat = low & ahead & ~swept, low & ~ahead & aside, low & ~ahead & ~aside
-    kinds = (swept, OFF_TINIEST), (tiny, OFF_TINY), (slender, OFF_SLENDER), (flat, OFF_FLAT)
+    kinds = (swept, OFF_SWEPT), (tiny, OFF_TINY), (slender, OFF_SLENDER), (flat, OFF_FLAT)
     which, offset = [np.flatnonzero(~low)], [np.zeros((int((~low).sum()), 3))]
     for kind, offsets in kinds:
         for behind, side in offsets:
@@ -325,7 +325,7 @@ def ordered(poses: Sequence[GraspPose], yaw: float, on_arm: bool = False) -> lis
 
     def cost(pose: GraspPose) -> float:
         narrow = NARROW * (float(pose.before < BEFORE[0]) + float(pose.before < BEFORE[-1]))
-        tips = EDGE * (pose.deep < BELOW)
+        tips = EDGE * (0.0 < pose.deep < BELOW)
         return pose.discomfort(yaw, on_arm) + narrow + BURDEN * pose.burden + SCRAPE * pose.scrapes + tips
 
     return sorted(poses, key=cost)
