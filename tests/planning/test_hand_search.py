@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from ig2mj.planning import grasps
 from ig2mj.planning.bodies import hand_spheres
 from ig2mj.planning.clearance import HELD, Obstacles
-from ig2mj.planning.grasps import GraspPose, ordered, sides
+from ig2mj.planning.grasps import UP, GraspPose, ordered, sides
 from ig2mj.planning.hand_search import search_way
 
 
@@ -41,7 +42,7 @@ def test_no_way_leads_through_a_wall_without_an_end_nor_to_where_the_hand_has_no
 
 
 def test_grasps_come_from_above_and_all_sides_with_fingers_along_the_face():
-    for normal, ways in sides():
+    for normal, ways in sides((1.0, 0.5)):
         assert np.isclose(np.linalg.norm(normal), 1) and normal[2] >= 0
         assert all(abs(way @ normal) < 1e-9 and np.isclose(np.linalg.norm(way), 1) for way in ways)
 
@@ -61,3 +62,11 @@ def test_what_is_swept_is_as_comfortable_from_above_as_anything_else():
     from_above = GraspPose(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0]), 0.12, deep=0.0)
     sloped = GraspPose(np.zeros(3), np.array([0.7, 0.0, 0.7]), np.array([0.7, 0.0, -0.7]), 0.12)
     assert ordered([sloped, from_above], 0.0)[0] is from_above
+
+
+def test_a_gripper_on_an_arm_may_point_to_where_it_likes_to_point_best():
+    palms = [-normal for normal, _ in grasps._ARM_SIDES]
+    assert min(GraspPose(np.zeros(3), UP, palm, 0.12).discomfort(0.0, on_arm=True) for palm in palms) < 1e-3
+    assert len(grasps._SIDES) == 17 and all(
+        any(np.allclose(n, m) for m, _ in grasps._ARM_SIDES) for n, _ in grasps._SIDES
+    )

@@ -2,6 +2,7 @@
 
 import types
 
+import numpy as np
 import pytest
 
 from ig2mj.planning import clutter, placing
@@ -87,3 +88,22 @@ def test_what_cannot_be_taken_out_of_the_way_is_pushed_aside(monkeypatch, graspa
     monkeypatch.setattr(clutter, "clutter_in_the_way", lambda *_: None)  # it lies upon the cup
     assert ended(clutter._moved(world, Step("grasp", ("cup",)), "rug")) == taken
     assert len(pushes) == pushed
+
+
+@pytest.mark.parametrize(("driven", "came"), [(0.0, False), (1.5, True)])
+def test_a_base_on_wheels_that_is_shut_in_pushes_through_what_it_cannot_move(monkeypatch, driven, came):
+    """A robot at x = 0 is to go to x = 2; it gets as far as `driven` (m)."""
+    world, at = world_in("kitchen_0"), [0.0]
+    world.body = types.SimpleNamespace(opening=0.1)  # pyright: ignore
+    floor = types.SimpleNamespace(way=lambda here, goal: np.array([[at[0], 0.0], [2.0, 0.0]]))
+    monkeypatch.setattr(World, "floor", lambda *_, **__: floor)
+    monkeypatch.setattr(World, "base", property(lambda self: (np.array([at[0], 0.0]), 0.0)))
+    monkeypatch.setattr(World, "index", lambda self, name: 0)
+    monkeypatch.setattr(clutter, "target_of", lambda *_: (2.0, 0.0, 0.0))
+    monkeypatch.setattr(clutter, "_nearer", lambda *_: 1.0)
+    monkeypatch.setattr(clutter, "nearest_floor", lambda *_: np.array([2.0, 0.0]))
+    running = clutter._pushed_through(world, Step("grasp", ("cup",)))
+    (phase,) = next(running)
+    assert phase.xy == (2.0, 0.0) and phase.speed == clutter.PUSHING
+    at[0] = driven
+    assert ended(running) == came

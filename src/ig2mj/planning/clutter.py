@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.planning.bodies import HandedBody
+from ig2mj.planning.driving import drive
 from ig2mj.planning.footprint import LOWEST
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor, Point
 from ig2mj.planning.grasping import with_free_hand
@@ -27,6 +28,9 @@ GAIN = 0.25
 """m by which floor has to be nearer to what a step is about than floor in reach, for things to be moved out of the way
 there."""
 
+PUSHING = 0.03
+"""m in an agent step of a base that pushes things in its way."""
+
 UPON = 0.03
 """m above an object's top up to which the bottom of what lies upon it is."""
 
@@ -35,15 +39,39 @@ NEAR_WAY, HIGH = 0.3, 1.05
 
 
 def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, str, bool]:
-    """Puts the first thing that is in the way elsewhere on the floor, or pushes it aside; returns whether there was
-    one, and it was."""
+    """Puts the first thing that is in the way elsewhere on the floor, or pushes it aside; where that fails a base on
+    wheels pushes through. Returns whether there was one, and it was."""
     if not isinstance(world.body, HandedBody):
         return False
     name = clutter_in_the_way(world, step)
     name = lying_upon(world, step) if name is None else name
     if name is None:
         return False
-    return (yield from with_free_hand(world, _moved(world, step, name)))
+    if (yield from with_free_hand(world, _moved(world, step, name))):
+        return True
+    return world.body.opening is not None and (yield from _pushed_through(world, step))
+
+
+def _pushed_through(world: PlannedWorld, step: Step) -> Generator[Program, str, bool]:
+    """Drives towards what a step is about as if loose things were not there, slowly, so that the base pushes them;
+    returns whether it came nearer. A robot that is shut in by them has no other way out."""
+    point = target_of(world, step)
+    if point is None or (reach := _nearer(world, step, point)) <= 0.0:
+        return False
+    without = [world.index(n) for n in _loose(world, step)]
+    freed = world.floor(without=without)
+    goal = nearest_floor(world, freed, point, reach)
+    way = None if goal is None else freed.way(world.base[0], goal)
+    if goal is None or way is None:
+        return False
+    yield drive(way, None, PUSHING)
+    left = world.floor(without=without).way(world.base[0], goal)
+    return left is not None and _length(way) - _length(left) > GAIN
+
+
+def _length(way: Float[np.ndarray, "N 2"]) -> float:
+    """m."""
+    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
 
 
 def _moved(world: PlannedWorld, step: Step, name: str) -> Generator[Program, str, bool]:

@@ -131,20 +131,27 @@ class GraspPose:
         return palm + 0.5 * fingers
 
 
-def sides() -> list[tuple[Vector, list[Vector]]]:
-    """Normals from which objects are taken, with the directions of fingers: from above, from all sides, and between."""
+def sides(rises: Sequence[float] = (1.0,)) -> list[tuple[Vector, list[Vector]]]:
+    """Normals from which objects are taken, with the directions of fingers: from above, from all sides, and between.
+
+    Args:
+      rises: of the sides between, height for a unit of length.
+    """
     angles = np.arange(COMPASS) * (2 * np.pi / COMPASS)
     level = [np.array([np.cos(a), np.sin(a), 0.0]) for a in angles]
     found = [(UP, level)]
     for normal in level:
         across = np.cross(UP, normal)
         found.append((normal, [UP, across, -across]))
-        slope = (normal + UP) / np.sqrt(2)
-        found.append((slope, [(UP - normal) / np.sqrt(2), across, -across]))
+        for rise in rises:
+            slope, steep = (v / np.hypot(1.0, rise) for v in (normal + rise * UP, UP - rise * normal))
+            found.append((slope, [steep, across, -across]))
     return found
 
 
-_SIDES = sides()
+_SIDES, _ARM_SIDES = sides(), sides((1.0, OBLIQUE[1] / OBLIQUE[0]))
+"""Of a hand that floats, and of a gripper on an arm, which points obliquely down, too: in compartments it has little
+room above."""
 
 
 def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles, room: float = 1.0) -> list[GraspPose]:
@@ -160,7 +167,8 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles, room: floa
     above = np.array([*centre[:2], corners[:, 2].min() + HIGH * np.ptp(corners[:, 2])])
     aims = np.array([centre, above, *middles[:MIDDLES], *(centre + OUTER * (world.rim(name) - centre))])
     size = float(np.linalg.norm(np.ptp(corners, axis=0))) + 0.1
-    normals = np.array([normal for normal, _ in _SIDES])
+    all_sides = _SIDES if world.body.opening is None else _ARM_SIDES
+    normals = np.array([normal for normal, _ in all_sides])
     origins = aims[None] + size * normals[:, None]
     main = np.flatnonzero((tables.graspable_object == index) & (tables.graspable_joint < 0))
     trunk = world.vertices_of_pieces(main_pieces(tables, index))
@@ -171,7 +179,7 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles, room: floa
             hits < obstacles.entries(*rays, index, int(tables.graspable_body[main[0]])) - 1e-6, np.inf, hits
         )
     points, fingers, palms = [], [], []
-    for (normal, ways), start, away in zip(_SIDES, origins, hits.reshape(len(normals), -1), strict=True):
+    for (normal, ways), start, away in zip(all_sides, origins, hits.reshape(len(normals), -1), strict=True):
         outermost = float((trunk @ normal).max())
         taken: list[Vector] = []
         for origin, hit in zip(start, away, strict=True):
