@@ -176,6 +176,7 @@ def test_what_is_tiny_lies_below_the_fingers_of_a_palm_from_above_and_not_below_
     aside = found[1:3] - behind[0]
     assert np.allclose(aside @ fingers[0], 0.0) and np.allclose(aside @ palms[0], 0.0)
     assert np.allclose(aside.sum(0), 0.0) and not np.allclose(aside[0], 0.0)
+    assert found[:count, 1].min() < -0.03 and found[:count, 1].max() > 0.03  # a palm 8 cm wide, 1 cm from a wall
     which, found, swept = grasps._under_fingers(stick, points, fingers, palms)
     along = len(grasps.OFF_SLENDER)
     assert which.tolist() == [*[0] * along, *[1] * count, 2]

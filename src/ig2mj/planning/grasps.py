@@ -84,7 +84,15 @@ above that at which a palm is from which their tips sweep it towards the palm; v
 direction."""
 
 OFF_SWEPT = ((0.055, 0.0), (0.07, 0.0), *((0.055, side) for side in (0.015, -0.015, 0.025, -0.025, 0.032, -0.032)))
-OFF_TINY = ((BEHIND_TINY, 0.0), (BEHIND_TINY, 0.02), (BEHIND_TINY, -0.02), (0.065, 0.0), (0.085, 0.0))
+OFF_TINY = (
+    (BEHIND_TINY, 0.0),
+    (BEHIND_TINY, 0.02),
+    (BEHIND_TINY, -0.02),
+    (0.065, 0.0),
+    (0.085, 0.0),
+    (0.055, 0.032),
+    (0.055, -0.032),
+)
 OFF_SLENDER = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02), (0.0, 0.03), (0.0, -0.03), (0.0, 0.036), (0.0, -0.036))
 OFF_FLAT = ((0.0, 0.0), (0.0, 0.02), (0.0, -0.02))
 """m by which a palm is behind what is tiny and flat, or tiny, or lies along the fingers and is as narrow, or is wider
