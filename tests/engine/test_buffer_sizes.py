@@ -50,6 +50,13 @@ def test_shared_buffers_follow_the_mean_and_spare_ones_the_worst_world(tiny_home
     assert profile_of(rare, tiny_home.model, safety=1e9).awake_dofs == default_profile(tiny_home.model).awake_dofs
 
 
+def test_a_world_has_rows_to_spare_where_calibration_shows_no_tail(tiny_home):
+    """A hand in a corner of aspen asked for more than the 200 rows of its calibration."""
+    always = Tail.of(np.full(8000, 100))
+    tails = {"awake_dofs": always, "constraints": always, "contacts": always, "pairs": always}
+    assert profile_of(Measurement(tails, {"contacts": 10.0, "pairs": 10.0}), tiny_home.model).constraints == 164
+
+
 def test_a_measurement_is_joined_with_another():
     a = Measurement({"contacts": Tail.of(np.array([3]))}, {"contacts": 3.0})
     b = Measurement({"contacts": Tail.of(np.array([5])), "pairs": Tail.of(np.array([9]))}, {"contacts": 2.0})

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from ig2mj.cli.train import _on_one_device
+from ig2mj.cli.train import _has_several_programs, _on_one_device
 from ig2mj.learn.run_files import run_table
 from ig2mj.process import imports
 
@@ -101,12 +101,12 @@ def test_devices_are_looked_for_before_imports_only_where_jax_will_use_a_gpu(mon
     assert len(looked) == 3
 
 
-def test_a_training_looks_for_them_early_where_no_option_of_xla_is_set_later():
+def test_a_training_looks_for_them_early_on_one_device_once_options_of_xla_are_set():
     one = run_table("CookingMeat")
     assert _on_one_device(one, (), None, {}) and _on_one_device({}, ("image_size=64",), "1", {})
-    assert not _on_one_device(run_table("CookingMeat-homes"), (), None, {})
-    for changes in (("programs=2",), ("homes=train",), ("engine=native",)):
-        assert not _on_one_device(one, changes, None, {})
+    assert not _on_one_device(one, ("engine=native",), None, {})
+    assert _has_several_programs(one, ()) and not _has_several_programs(one, ("programs=1",))
+    assert _has_several_programs(run_table("CookingMeat-homes"), ("programs=1",)), "one for each home"
     assert not _on_one_device(one, (), "all", {}) and not _on_one_device({**one, "devices": "2"}, (), None, {})
     slurm = {"SLURM_STEP_NODELIST": "a[1-2]", "SLURM_NTASKS": "2", "SLURM_JOB_ID": "1", "SLURM_PROCID": "0"}
     assert not _on_one_device(one, (), None, slurm)

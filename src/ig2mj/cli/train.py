@@ -95,9 +95,13 @@ def run(
     import os
 
     from ig2mj.learn.run_files import run_table
+    from ig2mj.process import keep_scratch_in_place
     from ig2mj.process.imports import find_gpu
 
-    if _on_one_device({} if config is None else run_table(config), set, devices, os.environ):
+    table = {} if config is None else run_table(config)
+    if _on_one_device(table, set, devices, os.environ):
+        if _has_several_programs(table, set):
+            keep_scratch_in_place()
         find_gpu(os.environ)  # while the rest is imported
 
     from ig2mj.learn.algorithms import check_settings
@@ -124,14 +128,23 @@ def run(
 def _on_one_device(
     table: Mapping[str, Any], changes: tuple[str, ...], devices: str | None, environ: Mapping[str, str]
 ) -> bool:
-    """Whether a run is on one device of this process and needs no option of XLA that is set later (`_train`), as far as
-    its file and the command say; both are checked later."""
+    """Whether a run is on one device of this process, as its file and the command say; both are checked later."""
     from ig2mj.cluster.process_topology import find_topology
 
-    said = {str(name): str(value) for name, value in table.get("settings", {}).items()}
-    said |= {name: value for name, _, value in (change.partition("=") for change in changes)}
     several = str(devices or table.get("devices", "1")) != "1" or find_topology(environ) is not None
-    return not several and said.get("engine") != "native" and not {"homes", "programs"} & said.keys()
+    return not several and _said(table, changes).get("engine") != "native"
+
+
+def _has_several_programs(table: Mapping[str, Any], changes: tuple[str, ...]) -> bool:
+    """Whether an iteration of a run is several programs, as far as its file and the command say."""
+    said = _said(table, changes)
+    return "homes" in said or said.get("programs") != "1"
+
+
+def _said(table: Mapping[str, Any], changes: tuple[str, ...]) -> dict[str, str]:
+    """Settings of a run's file and of the command, by name."""
+    said = {str(name): str(value) for name, value in table.get("settings", {}).items()}
+    return said | {name: value for name, _, value in (change.partition("=") for change in changes)}
 
 
 def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: tuple[str, ...]) -> int:

@@ -29,6 +29,10 @@ TAIL_LEAST, TAIL_LENGTH = 20, 1.5
 SHARED = 1.5
 """Factor on the largest mean over the worlds, for buffers that all worlds share."""
 
+SPARE_ROWS = 64
+"""Constraint rows of a world beyond the peak, at least: 16 contacts. In a small home a hand that lies in a corner adds
+them to what is always there, and the tail of a calibration does not show it."""
+
 ALIGN = 4
 """Sizes are rounded up to a multiple of this."""
 
@@ -119,9 +123,10 @@ def profile_of(measured: Measurement, model: mujoco.MjModel, safety: float = 1.0
     shared = {n: SHARED * means[n] for n in ("contacts", "pairs")}
     worst = {n: tails[n].beyond() for n in ("contacts", "pairs")}
     contacts, convex = max(shared.values()), shared["pairs"]
+    rows = max(tails["constraints"].beyond(), tails["constraints"].peak + SPARE_ROWS)
     return EngineProfile(
         awake_dofs=min(_round(safety * tails["awake_dofs"].beyond()), widest.awake_dofs),
-        constraints=min(_round(safety * tails["constraints"].beyond()), widest.constraints),
+        constraints=min(_round(safety * rows), widest.constraints),
         contacts=min(_round(safety * contacts), widest.contacts),
         convex_contacts=min(_round(safety * convex), widest.convex_contacts),
         spare_contacts=_round(safety * max(0.0, max(worst.values()) - contacts)),
