@@ -8,7 +8,7 @@ import pytest
 from ig2mj.geometry.host_rotations import about_vertical
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.free_floor import POCKET, FreeFloor
-from ig2mj.planning.grasping import _off_furniture
+from ig2mj.planning.grasping import _off_furniture, off_others_things
 from ig2mj.planning.moves import RETREAT
 from ig2mj.planning.occupancy import RESOLUTION, Occupancy
 from ig2mj.planning.phases import Until
@@ -142,3 +142,28 @@ def test_a_hand_that_has_closed_on_furniture_lets_go_of_it_and_others_hold_on():
     (program,) = _off_furniture(cast(PlannedWorld, _Caught()))
     assert {phase.hand for phase in program} == {1}
     assert program[0].close is False and program[0].until == Until.EMPTY and program[-1].reset
+
+
+class _Twice:
+    """A world in which hands hold things that one of them lifts, but for a chest."""
+
+    def __init__(self, *held):
+        self.held, self.domain = list(held), self
+
+    def hands_for(self, name):
+        return 1 + (name == "chest_0")
+
+
+def test_a_hand_that_has_closed_on_what_the_other_holds_lets_go_of_it():
+    holds = _Twice("plant_0", "plant_0")
+    letting_go = off_others_things(cast(PlannedWorld, holds))
+    program = next(letting_go)
+    assert {phase.hand for phase in program} == {1}
+    assert program[0].close is False and program[0].until == Until.EMPTY and program[-1].reset
+    holds.held[1] = ""
+    assert list(letting_go) == []
+
+
+@pytest.mark.parametrize("held", [("chest_0", "chest_0"), ("plant_0", "spoon_0"), ("", ""), ("plant_0", ""), ()])
+def test_hands_keep_what_they_mean_to_hold(held):
+    assert list(off_others_things(cast(PlannedWorld, _Twice(*held)))) == []

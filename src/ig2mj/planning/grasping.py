@@ -96,6 +96,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         if nowhere and nowhere >= world.held.count(""):  # no hand finds a way
             break
         yield from _off_furniture(world)
+        yield from off_others_things(world)
         hand = free_hand(world, attempt)
         if prefers is None and name in world.domain.tools and world.body.opening is None:
             prefers = functools.partial(_leaves_free, world, name)
@@ -159,6 +160,14 @@ def _off_furniture(world: PlannedWorld) -> Generator[Program, str, None]:
     """Hands let go of doors and drawers: one that ran into a drawer has lost what it held, and closed on that."""
     for hand, name in enumerate(world.held):
         if name and world.domain.fixed(name):
+            yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=15, after=""), *rest(hand)]
+
+
+def off_others_things(world: PlannedWorld) -> Generator[Program, str, None]:
+    """Hands let go of what another holds already, where one hand lifts it: one that has lost what it held on its way
+    has closed on that, and would count as full."""
+    for hand, name in enumerate(world.held):
+        if name in world.held[:hand] and name and world.domain.hands_for(name) == 1:
             yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=15, after=""), *rest(hand)]
 
 

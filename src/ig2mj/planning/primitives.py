@@ -15,7 +15,7 @@ from ig2mj.planning.cleaning import clean
 from ig2mj.planning.doors import through_doors
 from ig2mj.planning.driving import drive_near, go
 from ig2mj.planning.filling import fill
-from ig2mj.planning.grasping import grasp, is_graspable, release
+from ig2mj.planning.grasping import grasp, is_graspable, off_others_things, release
 from ig2mj.planning.mixing import mix
 from ig2mj.planning.moves import Primitive, PrimitiveFailed
 from ig2mj.planning.opening import set_open
@@ -42,6 +42,7 @@ BROUGHT_OUT = ("open", "close", "toggle_on", "toggle_off", "wipe", "scrub", "sli
 def _tried_again(world: PlannedWorld, step: Step) -> Primitive:
     """A primitive; what can be carried is brought out into the open where it fails, once."""
     action, (name, tool) = ACTIONS[step.primitive], _about(step)
+    yield from off_others_things(world)
     outcome = yield from _guarded(action(world, step))
     if outcome.done or step.primitive not in BROUGHT_OUT or outcome.reason in ("slipped", "timeout"):
         return outcome
