@@ -50,6 +50,9 @@ Prefers = Callable[[GraspPose], float]
 CLEARLY = 0.05
 """By which a pose has to be better than another to come before it."""
 
+MAKES_ROOM = 0.02
+"""m from where a hand carries something beyond which it goes aside for what another takes."""
+
 MOVED = 0.03
 """m that an object has moved beyond which its grasp is planned again."""
 
@@ -215,6 +218,7 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
         Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=True, tolerance=0.04, limit=30, after="",
               speed=0.03),
         *travel(hand, [p + lift for p in way[-2::-1]], None, keeps=index),
+        *_making_room(world, name, hand),
         carry(world, hand, keeps=index, name=name, grip=pose.point),
     ]  # fmt: skip
     if name in world.held:
@@ -223,6 +227,17 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     yield [Phase(hand=hand, close=False, pos=back, limit=10, after=""), *travel(hand, way[-2::-1], None), *rest(hand)]
     detail = f"the hand closed on {name} and does not hold it" if reason == "no_grasp" else ""
     return reason or "slipped", detail
+
+
+def _making_room(world: PlannedWorld, name: str, hand: int) -> Program:
+    """Other hands that float carry what they hold farther aside, where it would meet what a hand takes."""
+    held = [name if h == hand else n for h, n in enumerate(world.held)]
+    others = [h for h, n in enumerate(world.held) if h != hand and n and not world.domain.fixed(n)]
+    return [
+        carry(world, other, keeps=world.index(held[other]), held=held)
+        for other in (others if world.body.opening is None else [])
+        if np.linalg.norm(world.carry(other, held=held) - world.carry(other)) > MAKES_ROOM
+    ]
 
 
 def _plan(

@@ -175,11 +175,18 @@ def turn_at(world: PlannedWorld, hand: int, point: Vector, quat, keeps: int = -1
     return [dataclasses.replace(there, quat=None), there]
 
 
-def carry(world: PlannedWorld, hand: int, keeps: int = -1, name: str = "", grip: Vector | None = None) -> Phase:
+def carry(
+    world: PlannedWorld,
+    hand: int,
+    keeps: int = -1,
+    name: str = "",
+    grip: Vector | None = None,
+    held: Sequence[str] | None = None,
+) -> Phase:
     """The hand goes to where it carries an object (`PlannedWorld.carry`)."""
     return Phase(
         hand=hand,
-        pos=vector3(world.carry(hand, name, grip)),
+        pos=vector3(world.carry(hand, name, grip, held)),
         in_body=True,
         keeps=keeps,
         tolerance=0.08,

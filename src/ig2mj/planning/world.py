@@ -41,6 +41,9 @@ TALL, HANGS, RAISED, HIGHEST = 0.2, 0.05, 0.35, 1.85
 """m below a floating hand from which on what it carries is carried higher, and that it then hangs below where others
 are carried; by which it is, at most; and height of its top then, at most, which passes below the heads of doors."""
 
+BETWEEN, MOST_APART = 0.03, 0.6
+"""m between two things that hands carry, and by which they are carried apart for that at most."""
+
 WIDE = 0.25
 """m, half the diagonal of what a floating hand carries, from which on it is carried in front of the body's middle."""
 
@@ -321,13 +324,14 @@ class PlannedWorld:
             far = (spheres[:, :2] @ out).max() / np.linalg.norm(out)
         return float(min(AWAY + max(far - ALONG[-1], 0.0), FARTHEST))
 
-    def carry(self, hand: int, name: str = "", grip: Vector | None = None) -> Vector:
+    def carry(self, hand: int, name: str = "", grip: Vector | None = None, held: Sequence[str] | None = None) -> Vector:
         """Where a hand carries an object, "": what it holds, in the body's frame: as far ahead as that is wide, on an
         arm farther where it reaches back farther from the hand, and, if the hand floats, so high that what hangs below
-        it passes over counters.
+        it passes over counters. Two things that would meet are carried apart, each by half of that.
 
         Args:
-          grip: where a hand on an arm will hold the object, that is where it is now; None: where it holds it.
+          grip: where the hand will hold the object, that is where it is now; None: where it holds it. held: what each
+            hand will hold; None: as it is.
         """
         x, y, z = self.body.carry[hand]
         if name := name or self.held[hand]:
@@ -339,10 +343,33 @@ class PlannedWorld:
                 offset = (self.grip(hand) if grip is None else grip) - corners
                 back = max(half, float((offset[:, :2] @ (np.cos(yaw), np.sin(yaw))).max()))
             x = max(x, self.body.trunk[0] + BODY_SPARE + back)
-            y = 0.0 if half > WIDE and self.body.opening is None else y  # the middle of the way through a door
+            if self.body.opening is None:
+                y = self._apart(hand, name, grip, self.held if held is None else held)
             if self.body.opening is None and self.held[hand] == name and self.held.count(name) == 1:
                 z += self._raised(hand, float(low[2]), float(high[2]))
         return np.array([x, y, z])
+
+    def _apart(self, hand: int, name: str, grip: Vector | None, held: Sequence[str]) -> float:
+        """y of the grasp point of a hand that floats and carries an object, in the body's frame, m: see `carry`."""
+        others = [h for h, n in enumerate(held) if h != hand and n and n != name and not self.domain.fixed(n)]
+        y, low, high = self._across(hand, name, grip)
+        side = float(np.sign(self.body.carry[hand][1]))
+        for other in others:
+            there, lowest, highest = self._across(other, held[other], None)
+            meets = there + highest - (y + low) if side > 0 else y + high - (there + lowest)
+            y += side * min(max(meets + BETWEEN, 0.0), MOST_APART) / 2
+        return y
+
+    def _across(self, hand: int, name: str, grip: Vector | None) -> tuple[float, float, float]:
+        """y at which a hand carries an object alone, in the middle of the way through a door where it is wide; and from
+        there to both sides of the object, m."""
+        corners, yaw = self.vertices(name), self.base[1]
+        half = float(np.linalg.norm(np.ptp(corners[:, :2], axis=0))) / 2
+        y = 0.0 if half > WIDE else float(self.body.carry[hand][1])
+        if grip is None and self.held[hand] != name:
+            return y, -half, half
+        across = (corners - (self.grip(hand) if grip is None else grip))[:, :2] @ (-np.sin(yaw), np.cos(yaw))
+        return y, float(across.min()), float(across.max())
 
     def _raised(self, hand: int, low: float, high: float) -> float:
         """m by which a hand carries what reaches from a height to another higher than other things."""
