@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ig2mj.planning.grasping import _making_room
 from ig2mj.planning.moves import goes_on
-from ig2mj.planning.world import AWAY, BODY_SPARE, PlannedWorld
+from ig2mj.planning.world import AWAY, BETWEEN, BODY_SPARE, PlannedWorld
 
 TRUNK = 0.3
 
@@ -66,3 +67,57 @@ def test_an_arm_has_to_reach_a_grasp_itself_not_only_the_place_before_it():
     before, grasp = np.array([0.75, 0.0, 0.0]), np.array([0.85, 0.0, 0.0])
     assert goes_on([before], before, _Arm()) and not goes_on([before], grasp, _Arm())
     assert goes_on([before], grasp, None) and not goes_on(None, before, None)
+
+
+class _TwoHands(PlannedWorld):
+    """A robot at the origin that looks along y; its floating hands hold boxes of some widths, by points off their
+    middles."""
+
+    def __init__(self, *boxes, held=("left", "right")):
+        carry = np.array([[0.3, 0.16, 1.1], [0.3, -0.16, 1.1]])
+        self.body = SimpleNamespace(opening=None, carry=carry, trunk=(TRUNK, 1.5), stands=0.0)  # pyright: ignore[reportAttributeAccessIssue]
+        self._boxes, self._held = dict(zip(("left", "right"), boxes, strict=True)), list(held)
+        self.domain = SimpleNamespace(fixed=lambda name: False)  # pyright: ignore[reportAttributeAccessIssue]
+
+    @property
+    def base(self):
+        return np.zeros(2), np.pi / 2
+
+    @property
+    def held(self):
+        return self._held
+
+    def vertices(self, name):
+        width, _ = self._boxes[name]
+        return np.array([[x, y, 1.0] for x in (-width / 2, width / 2) for y in (0.5, 0.52)])
+
+    def grip(self, hand):
+        return np.array([self._boxes[("left", "right")[hand]][1], 0.51, 1.0])
+
+    def gap(self, held=None):
+        """m between both boxes where they are carried."""
+        sides = []
+        for hand, name in enumerate(("left", "right")):
+            across = self.grip(hand)[0] - self.vertices(name)[:, 0]
+            sides.append(float(self.carry(hand, name, self.grip(hand), held)[1]) + np.sort(across)[[0, -1]])
+        return sides[0][0] - sides[1][1]
+
+
+@pytest.mark.parametrize("boxes", [((0.4, 0.0), (0.4, 0.0)), ((0.6, 0.0), (0.1, 0.0)), ((0.4, -0.15), (0.4, 0.1))])
+def test_what_two_hands_carry_does_not_meet(boxes):
+    assert _TwoHands(*boxes).gap() == pytest.approx(BETWEEN)
+
+
+def test_what_does_not_meet_is_carried_where_each_hand_alone_carries_it():
+    both, alone = _TwoHands((0.1, 0.0), (0.2, 0.0)), _TwoHands((0.1, 0.0), (0.6, 0.0), held=("", "right"))
+    assert both.carry(0)[1] == -both.carry(1)[1] == pytest.approx(0.16) and both.gap() > BETWEEN
+    assert alone.carry(1)[1] == 0.0
+
+
+def test_a_hand_makes_room_for_what_the_other_takes():
+    taking = _TwoHands((0.4, 0.0), (0.6, 0.0), held=("", "right"))
+    taking.index = ("left", "right").index  # pyright: ignore[reportAttributeAccessIssue]
+    (aside,) = _making_room(taking, "left", 0)
+    assert aside.hand == aside.keeps == 1 and aside.in_body and aside.pos is not None and aside.pos[1] < -0.1
+    assert taking.gap(held=("left", "right")) == pytest.approx(BETWEEN, abs=1e-3)
+    assert _making_room(_TwoHands((0.1, 0.0), (0.2, 0.0), held=("", "right")), "left", 0) == []
