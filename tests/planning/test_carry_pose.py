@@ -76,7 +76,7 @@ class _TwoHands(PlannedWorld):
     def __init__(self, *boxes, held=("left", "right")):
         carry = np.array([[0.3, 0.16, 1.1], [0.3, -0.16, 1.1]])
         self.body = SimpleNamespace(opening=None, carry=carry, trunk=(TRUNK, 1.5), stands=0.0)  # pyright: ignore[reportAttributeAccessIssue]
-        self._boxes, self._held = dict(zip(("left", "right"), boxes, strict=True)), list(held)
+        self._boxes, self._held = dict[str, tuple[float, float]](zip(("left", "right"), boxes, strict=True)), list(held)
         self.domain = SimpleNamespace(fixed=lambda name: False)  # pyright: ignore[reportAttributeAccessIssue]
 
     @property
