@@ -118,6 +118,38 @@ def test_what_is_lost_while_a_basin_is_cleared_is_taken_again(monkeypatch, clear
     assert ended.value.value.done and calls == ["grasp"]
 
 
+@pytest.mark.parametrize(("held", "out"), [(["cup", "plate"], ["plate"]), (["cup", ""], []), (["cup"], [])])
+def test_what_the_other_hand_holds_is_brought_out_where_nothing_else_gives_room(monkeypatch, held, out):
+    world: Any = SimpleNamespace(held=held, index=lambda name: 0, base=(np.zeros(2), 0.0))
+    world.facts = SimpleNamespace(holds=lambda *condition: not all(world.held))
+    brought = []
+
+    def bring_out(world, name):
+        brought.append(name)
+        world.held[world.held.index(name)] = ""
+        yield []
+        return Outcome()
+
+    def hold_at(world, name, hand, holds):
+        yield []
+        return ("", [np.zeros(3)], 0) if "plate" not in world.held else ("no_path", [], -1)
+
+    def clear_basin(world, source, moved):
+        raise AssertionError("what the other hand holds comes first")
+        yield
+
+    for name, stand_in in (("hold_at", hold_at), ("clear_basin", clear_basin), ("bring_out", bring_out)):
+        monkeypatch.setattr(taps, name, stand_in)
+    monkeypatch.setattr(taps, "wait_until", lambda *given: iter(()))
+    monkeypatch.setattr(taps, "source_of", lambda world, tap: np.zeros(3))
+    monkeypatch.setattr(taps, "carry", lambda world, hand: None)
+    running = taps.hold_below_tap(world, "cup", "sink", lambda hand, source: [], ("soaked", "cup"), 1.0)
+    with pytest.raises(StopIteration) as ended:
+        while True:
+            next(running)
+    assert brought == out and (ended.value.value.done or held == ["cup"])
+
+
 @pytest.mark.parametrize("opened", [True, False])
 def test_what_is_put_down_for_a_free_hand_is_taken_again_whatever_came_of_it(monkeypatch, opened):
     world: Any = SimpleNamespace(held=["rag"])

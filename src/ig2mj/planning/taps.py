@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
-from ig2mj.planning.grasping import held_again
+from ig2mj.planning.grasping import held_again, put_down_others
 from ig2mj.planning.holding import Hold, hold_at, wait_until
 from ig2mj.planning.moves import Primitive, Program, carry, hand_with, travel
 from ig2mj.planning.placing import bring_out, regrasp
@@ -38,13 +38,15 @@ def hold_below_tap(
     """
     hand, source = hand_with(world, name), source_of(world, tap)
     reason, failed, again, moved = "", set[int](), False, set[str]()
-    for attempt in range(WAYS + MOST_MOVED):
+    for attempt in range(WAYS + MOST_MOVED + 1):
         if not (yield from held_again(world, name)):
             return Outcome("slipped", f"the hand lost {name}", attempts=attempt)
         hand = hand_with(world, name)
         left = lambda hand=hand: [h for h in holds(hand, source) if h.number not in failed]  # noqa: E731
         reason, way, number = yield from hold_at(world, name, hand, left)
         if reason == "slipped" and name not in world.held:
+            continue
+        if number < 0 and (yield from others_brought_out(world, name)):
             continue
         if number < 0 and ((yield from clear_basin(world, source, moved)) or name not in world.held):
             continue
@@ -60,6 +62,16 @@ def hold_below_tap(
             return Outcome()
         failed.add(number)
     return Outcome(reason or "not_true_after", f"{name} did not take enough water")
+
+
+def others_brought_out(world: PlannedWorld, name: str) -> Generator[Program, str, bool]:
+    """Where no hand is free, puts what others hold than an object onto open floor: it is in the way as well. Returns
+    whether there was such a thing, and a hand is free."""
+    others = [n for n in world.held if n and n != name] if all(world.held) else []
+    for other in others:
+        yield from bring_out(world, other)
+    yield from put_down_others(world, name)
+    return bool(others) and not all(world.held)
 
 
 WAYS = 3
