@@ -4,7 +4,7 @@ import multiprocessing
 from types import SimpleNamespace
 
 import ig2mj
-from ig2mj.envs.planning_processes import PlanningProcesses
+from ig2mj.envs.planning_processes import TOGETHER, PlanningProcesses
 
 
 class Pipe:
@@ -12,10 +12,10 @@ class Pipe:
 
     def __init__(self):
         self.sent, (own, self.other) = [], multiprocessing.Pipe()
-        self.fileno, self.recv, self.close = own.fileno, own.recv, own.close
+        self.fileno, self.recv, self.poll, self.close = own.fileno, own.recv, own.poll, own.close
 
-    def send(self, request):
-        self.sent.append(request[1])
+    def send(self, requests):
+        self.sent.append([world for _, world, *_ in requests])
 
 
 class Process:
@@ -24,19 +24,26 @@ class Process:
         self.is_alive = lambda: False
 
 
-def test_a_process_gets_its_next_request_when_it_has_answered(monkeypatch):
+def test_a_process_gets_its_next_requests_when_it_has_answered_all(monkeypatch):
+    """Several at once: with one for each step of the worlds, most of 1,024 hold still while processes rest."""
     pipes = [Pipe(), Pipe()]
     left = iter(pipes)
     context = SimpleNamespace(Pipe=lambda: (next(left), SimpleNamespace(close=lambda: None)), Process=Process)
     monkeypatch.setattr(multiprocessing, "get_context", lambda kind: context)
     env = SimpleNamespace(config=ig2mj.EnvConfig(), task=SimpleNamespace(name="any"))
     with PlanningProcesses(env, 2) as planners:  # pyright: ignore[reportArgumentType]
-        for world in range(5):
+        for world in range(2 * TOGETHER + 4):
             planners.begin(world, world, None)  # pyright: ignore[reportArgumentType]
-        assert [pipe.sent for pipe in pipes] == [[0], [1]]
+        assert [pipe.sent for pipe in pipes] == [[[0]], [[1]]]
         pipes[0].other.send((0, [], 0.5))
         assert list(planners.answers(wait=True)) == [(0, [])]
-        assert [pipe.sent for pipe in pipes] == [[0, 2], [1]]
-        assert planners.asked == {1, 2, 3, 4} and planners.seconds == 0.5
+        most = list(range(2, 2 * TOGETHER + 1, 2))
+        assert [pipe.sent for pipe in pipes] == [[[0], most], [[1]]]
+        assert planners.asked == set(range(1, 2 * TOGETHER + 4)) and planners.seconds == 0.5
+        for world in most[:-1]:
+            pipes[0].other.send((world, [], 0.0))
+        assert [world for world, _ in planners.answers()] == most[:-1] and pipes[0].sent[1:] == [most]
+        pipes[0].other.send((most[-1], [], 0.0))
+        assert list(planners.answers()) == [(most[-1], [])] and pipes[0].sent[2:] == [[2 * TOGETHER + 2]]
     for pipe in pipes:
         pipe.other.close()

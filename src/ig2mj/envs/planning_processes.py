@@ -28,6 +28,9 @@ from ig2mj.envs.registry import make
 from ig2mj.errors import EngineError, Ig2mjError
 from ig2mj.planning.away import Answer, PlanningAway, WorldCopy
 
+TOGETHER = 8
+"""Requests that a process gets at once, at most: a step of many worlds takes as long as it plans for some of them."""
+
 
 def planning_of(env: Environment, seed: int = 0) -> PlanningAway:
     """What plans for copies of an environment's worlds, in this process. Raises EngineError: it has no goal."""
@@ -62,7 +65,7 @@ class PlanningProcesses:
         self._processes: list[Any] = []
         self._pipes: list[multiprocessing.connection.Connection] = []
         self._waiting = [collections.deque[tuple[Any, ...]]() for _ in range(processes)]  # requests by process
-        self._busy = [False] * processes
+        self._pending = [0] * processes  # answers that a process still owes
         if processes == 0:
             return
         config = dataclasses.replace(env.config, worlds=1, engine="native", engine_options={}, observations=())
@@ -102,11 +105,14 @@ class PlanningProcesses:
         self._send(number)
 
     def _send(self, number: int) -> None:
-        """Sends a process its next request if it has answered all others: a pipe holds less than a request, and
-        writing to one whose reader is busy blocks."""
-        if self._waiting[number] and not self._busy[number]:
-            self._busy[number] = True
-            self._pipes[number].send(self._waiting[number].popleft())
+        """Sends a process its next requests if it has answered all others: a pipe holds less than a request, and
+        writing to one whose reader is busy blocks. There are several of them, so that it goes on planning while the
+        worlds take a step."""
+        waiting = self._waiting[number]
+        if waiting and not self._pending[number]:
+            requests = [waiting.popleft() for _ in range(min(TOGETHER, len(waiting)))]
+            self._pending[number] = len(requests)
+            self._pipes[number].send(requests)
 
     def answers(self, wait: bool = False) -> Iterator[tuple[int, Answer | Ig2mjError]]:
         """Worlds and their answers that are there; an error of one of them is its answer.
@@ -124,14 +130,20 @@ class PlanningProcesses:
             return
         ready = multiprocessing.connection.wait(self._pipes, None if wait and self.asked else 0.0)
         for number in (k for k, p in enumerate(self._pipes) if p in ready):
-            try:
-                answer = self._pipes[number].recv()
-            except EOFError:
-                words = "a process that plans has ended (is there enough memory for so many?)"
-                raise EngineError(words) from None
-            self._busy[number] = False
+            for answer in self._received(number):
+                yield self._took(answer)
             self._send(number)
-            yield self._took(answer)
+
+    def _received(self, number: int) -> Iterator[tuple[int, Any, float]]:
+        """Answers of a process that are there. Raises EngineError: it has ended."""
+        try:
+            while self._pending[number] and self._pipes[number].poll():
+                answer = self._pipes[number].recv()
+                self._pending[number] -= 1
+                yield answer
+        except EOFError:
+            words = "a process that plans has ended (is there enough memory for so many?)"
+            raise EngineError(words) from None
 
     def _took(self, answer: tuple[int, Any, float]) -> tuple[int, Answer | Ig2mjError]:
         world, found, seconds = answer
@@ -177,4 +189,5 @@ def _serve(pipe: multiprocessing.connection.Connection, name: str, config: EnvCo
     planning = planning_of(make(name, config), seed)
     with contextlib.suppress(EOFError, OSError):
         while True:
-            pipe.send(_answer(planning, pipe.recv()))
+            for request in pipe.recv():
+                pipe.send(_answer(planning, request))
