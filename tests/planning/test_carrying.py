@@ -4,7 +4,7 @@ import types
 
 import numpy as np
 
-from ig2mj.planning.carrying import carried_way
+from ig2mj.planning.carrying import HEADINGS, carried_way
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.world import PlannedWorld
 
@@ -20,11 +20,21 @@ class _Corridor(Obstacles):
         return not ((x < self._end) & (np.abs(y) + radius > 0.5)).any()
 
 
+class _Pole(Obstacles):
+    """A pole, 2 cm thick, 1.1 m from a place on the x axis, between two of the headings there; nothing else."""
+
+    def __init__(self, at: float, between: float):
+        self._xy = np.array([at + 1.1 * np.cos(between), 1.1 * np.sin(between)])
+
+    def clear(self, spheres):
+        return not (np.linalg.norm(spheres[:, :2] - self._xy, axis=1) < 0.01 + spheres[:, 3]).any()
+
+
 class _World(PlannedWorld):
     """A robot at the origin that looks along x and holds a rod of 0.9 m before it."""
 
-    def __init__(self, opens: bool = True):
-        self._corridor = _Corridor(opens)
+    def __init__(self, opens: bool = True, corridor: Obstacles | None = None):
+        self._corridor = corridor or _Corridor(opens)
         self.domain = types.SimpleNamespace(fixed=lambda name: False)  # pyright: ignore[reportAttributeAccessIssue]
 
     @property
@@ -64,3 +74,13 @@ def test_there_is_no_way_that_turns_in_a_corridor_without_end():
     assert carried_way(_World(opens=False), POINTS, np.pi / 2) is None
     straight = carried_way(_World(opens=False), POINTS, 0.0)
     assert straight is not None and len({round(s.yaw, 6) for s in straight}) == 1
+
+
+def test_what_is_held_is_not_turned_through_what_is_thinner_than_a_turn_by_one_heading():
+    """From one heading to the next the end of the rod moves by 0.5 m: neither meets the pole, the turn does."""
+    pole, ahead = _Pole(0.0, 1.5 * 2 * np.pi / HEADINGS), np.array([[0.0, 0.0], [0.0, 0.0]])
+    world = _World(corridor=pole)
+    way = carried_way(world, ahead, np.pi / 2)
+    assert way is not None
+    yaws = np.unwrap([0.0, *(s.yaw for s in way)])
+    assert yaws.min() < -np.pi  # the other way around

@@ -19,25 +19,30 @@ from ig2mj.planning.world import PlannedWorld, Stance
 HEADINGS, APART = 16, 0.1
 """Directions that the robot may face on the way, and m between the places of the way at which it may turn, at most."""
 
+BETWEEN = 0.05
+"""m that what is held moves between the poses that are looked at on the way from one place or heading to the next: a
+turn by one heading would take it past the back of a chair."""
+
 TURN = 0.15
 """m of way that a turn by one heading counts as."""
 
 
 def carried_way(world: PlannedWorld, points: Float[np.ndarray, "N 2"], yaw: float) -> list[Stance] | None:
     """Stances one after another, between which the base shifts, or turns where it is; None: there is no such way. Where
-    there is none on which what is held keeps clear, it is brought past other things that closely.
+    there is none on which what is held keeps clear, it is brought past other things that closely; where there is none,
+    either, it may brush past them between two headings.
 
     Args:
       points: of a way over the floor; the first is where the robot is. yaw: rad, at its end.
     """
-    ways = (_carried_way(world, points, yaw, share) for share in (1.0, TOUCHES))
+    ways = (_carried_way(world, points, yaw, share, fine) for fine in (True, False) for share in (1.0, TOUCHES))
     return next((way for way in ways if way is not None), None)
 
 
 def _carried_way(
-    world: PlannedWorld, points: Float[np.ndarray, "N 2"], yaw: float, share: float
+    world: PlannedWorld, points: Float[np.ndarray, "N 2"], yaw: float, share: float, fine: bool
 ) -> list[Stance] | None:
-    """`carried_way` with a share of the radii of what is held."""
+    """`carried_way` with a share of the radii of what is held. fine: it keeps clear between two headings, too."""
     places = _sampled(points)
     (here, now), last = world.base, len(places) - 1
     held = _held(world) * (1.0, 1.0, 1.0, share)
@@ -45,13 +50,33 @@ def _carried_way(
     step = 2 * np.pi / HEADINGS
     goal = last, round((yaw - now) / step) % HEADINGS
     known: dict[tuple[int, int], bool] = {(0, 0): True}
+    passed = dict[tuple[tuple[int, int], tuple[int, int]], bool]()
+    reach = float(np.linalg.norm(held[:, :2], axis=1).max(initial=0.0))
+    turning = max(1, int(np.ceil(step * reach / BETWEEN)))
+
+    def at_pose(xy: np.ndarray, heading: float) -> np.ndarray:
+        there = held[:, :3] @ about_vertical(now + step * heading).T + np.array([*xy, 0.0])
+        return np.concatenate([there, held[:, 3:]], axis=1)
 
     def clear(state: tuple[int, int]) -> bool:
         if state not in known:
-            at, heading = state
-            there = held[:, :3] @ about_vertical(now + step * heading).T + np.array([*places[at], 0.0])
-            known[state] = obstacles.clear(np.concatenate([there, held[:, 3:]], axis=1))
+            known[state] = obstacles.clear(at_pose(places[state[0]], float(state[1])))
         return known[state]
+
+    def passes(state: tuple[int, int], other: tuple[int, int]) -> bool:
+        """Whether what is held keeps clear between two neighbouring states; where the robot is now, it may touch
+        something."""
+        if other == (0, 0):
+            return passes(other, state)
+        key = (state, other) if state < other or state == (0, 0) else (other, state)
+        if key not in passed:
+            state, other = key
+            (a, b), side = (state[0], other[0]), (other[1] - state[1] + 1) % HEADINGS - 1
+            count = turning if a == b else max(1, int(np.ceil(np.linalg.norm(places[b] - places[a]) / BETWEEN)))
+            shares = np.arange(1 if state != (0, 0) else max(1, count // 2), count) / count
+            poses = [at_pose(places[a] + t * (places[b] - places[a]), state[1] + t * side) for t in shares]
+            passed[key] = not poses or obstacles.clear(np.concatenate(poses))
+        return passed[key]
 
     costs, before = {(0, 0): 0.0}, dict[tuple[int, int], tuple[int, int]]()
     queue = [(0.0, (0, 0))]
@@ -65,7 +90,7 @@ def _carried_way(
         turns = [((at, (heading + side) % HEADINGS), TURN) for side in (1, -1)]
         moves = [((at + side, heading), APART) for side in (1, -1) if 0 <= at + side <= last]
         for other, extra in (*moves, *turns):
-            if cost + extra < costs.get(other, np.inf) and clear(other):
+            if cost + extra < costs.get(other, np.inf) and clear(other) and (not fine or passes(state, other)):
                 costs[other], before[other] = cost + extra, state
                 heapq.heappush(queue, (cost + extra, other))
     if goal not in costs:
