@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
+
 import mujoco
 import numpy as np
 import pytest
 
-from ig2mj.engine.warp.buffer_sizes import RARE, SHARED, Measurement, Tail, profile_of
+from ig2mj.engine.warp.buffer_sizes import RARE, SHARED, SPARE_ROWS, Measurement, Tail, profile_of
 from ig2mj.engine.warp.candidate_pairs import CandidatePairs
 from ig2mj.engine.warp.profile import default_profile
+from ig2mj.scene.paths import SHIPPED_HOMES
 
 
 def test_quantiles_and_the_peak_of_what_was_counted():
@@ -55,6 +58,12 @@ def test_a_world_has_rows_to_spare_where_calibration_shows_no_tail(tiny_home):
     always = Tail.of(np.full(8000, 100))
     tails = {"awake_dofs": always, "constraints": always, "contacts": always, "pairs": always}
     assert profile_of(Measurement(tails, {"contacts": 10.0, "pairs": 10.0}), tiny_home.model).constraints == 164
+
+
+def test_homes_that_ship_have_rows_to_spare():
+    for file in SHIPPED_HOMES.glob("*/engine_profile*.json"):
+        profile = json.loads(file.read_text())
+        assert profile["constraints"] >= profile["measured"]["peak_constraints"] + SPARE_ROWS, file
 
 
 def test_a_measurement_is_joined_with_another():

@@ -37,6 +37,12 @@ def test_no_home_is_in_both_parts():
     assert SPLITS["held_out:all"] == Split("held_out:all", *["held_out"] * 4)
 
 
+def test_a_place_belongs_to_the_split_of_its_home():
+    Split.of("held_out:homes").check_home("elm:1")
+    with pytest.raises(EngineError, match="home='birch:1' is none"):
+        Split.of("held_out:homes").check_home("birch:1")
+
+
 @pytest.mark.parametrize(
     ("options", "error", "said"),
     [

@@ -42,6 +42,19 @@ def test_it_still_passes_below_the_heads_of_doors():
     assert Carrying(0.4, HIGHEST).carry(0)[2] == pytest.approx(0.5)
 
 
+def held_below_tap(monkeypatch, world: Any, **stand_ins: Any) -> Outcome:
+    """How holding a cup below a tap ends. `stand_ins`: functions of `taps` in place of its own."""
+    usual = {"wait_until": lambda *given: iter(()), "carry": lambda *given: None}
+    usual["source_of"] = lambda world, tap: np.zeros(3)
+    for name, stand_in in {**usual, **stand_ins}.items():
+        monkeypatch.setattr(taps, name, stand_in)
+    running = taps.hold_below_tap(world, "cup", "sink", lambda hand, source: [], ("soaked", "cup"), 1.0)
+    with pytest.raises(StopIteration) as ended:
+        while True:
+            next(running)
+    return ended.value.value
+
+
 @pytest.mark.parametrize("losses", [1, 2])
 def test_what_is_lost_on_the_way_to_a_tap_is_taken_again(monkeypatch, losses):
     world: Any = SimpleNamespace(held=["cup", ""], index=lambda name: 0, base=(np.zeros(2), 0.0))
@@ -69,15 +82,7 @@ def test_what_is_lost_on_the_way_to_a_tap_is_taken_again(monkeypatch, losses):
         return ""
 
     monkeypatch.setattr(grasping, "grasp", grasp)
-    monkeypatch.setattr(taps, "hold_at", hold_at)
-    monkeypatch.setattr(taps, "wait_until", wait_until)
-    monkeypatch.setattr(taps, "source_of", lambda world, tap: np.zeros(3))
-    monkeypatch.setattr(taps, "carry", lambda world, hand: None)
-    running = taps.hold_below_tap(world, "cup", "sink", lambda hand, source: [], ("soaked", "cup"), 1.0)
-    with pytest.raises(StopIteration) as ended:
-        while True:
-            next(running)
-    assert ended.value.value.done and len(taken) == losses
+    assert held_below_tap(monkeypatch, world, hold_at=hold_at, wait_until=wait_until).done and len(taken) == losses
 
 
 @pytest.mark.parametrize("cleared", [True, False])
@@ -106,16 +111,8 @@ def test_what_is_lost_while_a_basin_is_cleared_is_taken_again(monkeypatch, clear
         yield
 
     monkeypatch.setattr(grasping, "grasp", grasp)
-    for name, stand_in in (("hold_at", hold_at), ("clear_basin", clear_basin), ("regrasp", regrasp)):
-        monkeypatch.setattr(taps, name, stand_in)
-    monkeypatch.setattr(taps, "wait_until", lambda *given: iter(()))
-    monkeypatch.setattr(taps, "source_of", lambda world, tap: np.zeros(3))
-    monkeypatch.setattr(taps, "carry", lambda world, hand: None)
-    running = taps.hold_below_tap(world, "cup", "sink", lambda hand, source: [], ("soaked", "cup"), 1.0)
-    with pytest.raises(StopIteration) as ended:
-        while True:
-            next(running)
-    assert ended.value.value.done and calls == ["grasp"]
+    outcome = held_below_tap(monkeypatch, world, hold_at=hold_at, clear_basin=clear_basin, regrasp=regrasp)
+    assert outcome.done and calls == ["grasp"]
 
 
 @pytest.mark.parametrize(("held", "out"), [(["cup", "plate"], ["plate"]), (["cup", ""], []), (["cup"], [])])
@@ -138,16 +135,8 @@ def test_what_the_other_hand_holds_is_brought_out_where_nothing_else_gives_room(
         raise AssertionError("what the other hand holds comes first")
         yield
 
-    for name, stand_in in (("hold_at", hold_at), ("clear_basin", clear_basin), ("bring_out", bring_out)):
-        monkeypatch.setattr(taps, name, stand_in)
-    monkeypatch.setattr(taps, "wait_until", lambda *given: iter(()))
-    monkeypatch.setattr(taps, "source_of", lambda world, tap: np.zeros(3))
-    monkeypatch.setattr(taps, "carry", lambda world, hand: None)
-    running = taps.hold_below_tap(world, "cup", "sink", lambda hand, source: [], ("soaked", "cup"), 1.0)
-    with pytest.raises(StopIteration) as ended:
-        while True:
-            next(running)
-    assert brought == out and (ended.value.value.done or held == ["cup"])
+    outcome = held_below_tap(monkeypatch, world, hold_at=hold_at, clear_basin=clear_basin, bring_out=bring_out)
+    assert brought == out and (outcome.done or held == ["cup"])
 
 
 @pytest.mark.parametrize("opened", [True, False])

@@ -8,9 +8,11 @@ import sys
 
 import pytest
 
+from ig2mj.cli import train
 from ig2mj.cli.train import _has_several_programs, _on_one_device
 from ig2mj.learn.run_files import run_table
 from ig2mj.process import imports
+from ig2mj.process.settings import SCRATCH_IN_PLACE
 
 
 def imported(code: str) -> set[str]:
@@ -110,6 +112,20 @@ def test_a_training_looks_for_them_early_on_one_device_once_options_of_xla_are_s
     assert not _on_one_device(one, (), "all", {}) and not _on_one_device({**one, "devices": "2"}, (), None, {})
     slurm = {"SLURM_STEP_NODELIST": "a[1-2]", "SLURM_NTASKS": "2", "SLURM_JOB_ID": "1", "SLURM_PROCID": "0"}
     assert not _on_one_device(one, (), None, slurm)
+
+
+@pytest.mark.parametrize(("changes", "kept"), [((), True), (("programs=1",), False), (("homes=birch,elm",), True)])
+def test_options_of_xla_are_set_before_the_gpu_is_looked_for(monkeypatch, changes, kept):
+    """XLA reads them once: where an iteration is several programs, scratch memory stays in place."""
+    monkeypatch.setenv("XLA_FLAGS", "")
+
+    def find_gpu(environ):
+        raise InterruptedError(environ["XLA_FLAGS"])
+
+    monkeypatch.setattr(imports, "find_gpu", find_gpu)
+    with pytest.raises(InterruptedError) as said:
+        train.run("CookingMeat", set=changes)
+    assert (SCRATCH_IN_PLACE in str(said.value)) == kept
 
 
 def test_what_a_run_file_says_is_read_without_jax():

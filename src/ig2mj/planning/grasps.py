@@ -112,7 +112,7 @@ class GraspPose:
         way when it is put down; 0 to 1.
       scrapes: fingers meet what is around the object, unless the object stops the hand before.
       room: share of the spheres' radii that keeps clear of what is around on the hand's way.
-      deep: m beyond the point that the hand goes for, until it touches the object.
+      deep: m beyond the point that the hand goes for, until it touches the object; 0: it stays there (`sweeps`).
     """
 
     point: Vector
@@ -123,6 +123,11 @@ class GraspPose:
     scrapes: bool = False
     deep: float = BELOW
     room: float = 1.0
+
+    @property
+    def sweeps(self) -> bool:
+        """Fingers close slowly where the hand is, and sweep what is tiny and flat towards the palm."""
+        return self.deep <= 0.0
 
     def at(self, away: float) -> Vector:
         """A point above the surface, m along its normal."""
@@ -341,7 +346,7 @@ def ordered(poses: Sequence[GraspPose], yaw: float, on_arm: bool = False) -> lis
 
     def cost(pose: GraspPose) -> float:
         narrow = NARROW * (float(pose.before < BEFORE[0]) + float(pose.before < BEFORE[-1]))
-        tips = EDGE * (0.0 < pose.deep < BELOW)
+        tips = EDGE * (pose.deep < BELOW and not pose.sweeps)
         return pose.discomfort(yaw, on_arm) + narrow + BURDEN * pose.burden + SCRAPE * pose.scrapes + tips
 
     return sorted(poses, key=cost)

@@ -45,7 +45,7 @@ def closing_on(world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: 
         after="",
         speed=COMING,
     )
-    if pose.deep <= 0.0:  # fingers sweep it towards the palm
+    if pose.sweeps:
         return [
             *travel(hand, way, quat),
             Phase(hand=hand, pos=deep, quat=quat, tolerance=0.004, limit=25, after="", speed=TOUCHING),

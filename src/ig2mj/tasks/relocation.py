@@ -200,12 +200,12 @@ def _moved(task: Task, home: str, spot: Spot) -> Task:
 
     def acts(name: str, one: Acts) -> Acts:
         assert one.pos is not None
-        yaw, floats = (one.yaw + turned) % 360, name == "humanoid" and len(one.pos) == 3
-        x, y, *_ = place(one.pos)
-        if not floats and yaw % 90 == 0:
+        (x, y, *_), yaw = place(one.pos), (one.yaw + turned) % 360
+        if name == "humanoid" and len(one.pos) == 3:
+            return dataclasses.replace(one, pos=(x, y, round(one.pos[2] + raised, 3)), yaw=yaw)
+        if yaw % 90 == 0:  # one that stands askew has its own place
             x, y = round(x + spot.arm * float(left[0]), 3), round(y + spot.arm * float(left[1]), 3)
-        height = one.pos[2] + raised if len(one.pos) == 3 and floats else spot.height
-        return dataclasses.replace(one, pos=(x, y, round(height, 3)), yaw=yaw)
+        return dataclasses.replace(one, pos=(x, y, spot.height), yaw=yaw)
 
     def near(one: Near) -> Near:
         return dataclasses.replace(one, pos=place(one.pos))

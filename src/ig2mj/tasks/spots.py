@@ -82,7 +82,7 @@ def best_spot(name: str, fit: Fit, folder: str) -> Spot:
     """The best spot in a home. Raises EngineError: there is none."""
     home = Household(bare_scene(folder))
     label = home.scene.name
-    anchors = [a for kind in fit.anchors for a in home.of(kind)] if fit.anchors else [""]
+    anchors = _anchors(home, fit)
     surfaces = [(s, rank) for rank, kind in enumerate(fit.surfaces) for s in home.of(kind)]
     if not anchors:
         raise EngineError(f"{name} cannot be done in '{label}': it has no {' and no '.join(fit.anchors)}")
@@ -101,6 +101,11 @@ def best_spot(name: str, fit: Fit, folder: str) -> Spot:
             "within a robot's reach"
         )
     return _for_arm(home, fit, max(found, key=lambda spot: spot.likeness))
+
+
+def _anchors(home: Household, fit: Fit) -> list[str]:
+    """Furniture at which an activity can be done; a single "" where none is needed."""
+    return [a for kind in fit.anchors for a in home.of(kind)] if fit.anchors else [""]
 
 
 def _points(low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"]) -> Float[np.ndarray, "N 3"]:
@@ -145,8 +150,8 @@ def _spots(home: Household, fit: Fit, anchor: str, surface: str, rank: int) -> I
         ticks = np.arange(-reach, reach + step, step)
         at = np.round((middle + np.array(np.meshgrid(ticks, ticks)).reshape(2, -1).T) / STEP) * STEP
         if target is None:  # in front of the surface
-            beside = np.maximum(low[:2] - at, at - high[:2])
-            at = at[np.linalg.norm(np.maximum(beside, 0.0), axis=1) < fit.gap + 0.1]
+            outside = np.maximum(low[:2] - at, at - high[:2])
+            at = at[np.linalg.norm(np.maximum(outside, 0.0), axis=1) < fit.gap + 0.1]
         if not len(at):
             continue
         at = at[home.free(at, 0.0)]
@@ -234,7 +239,7 @@ def further_spots(fit: Fit, folder: str, surface: str, anchor: str) -> tuple[Spo
       surface, anchor: of the home's first place.
     """
     home = Household(bare_scene(folder))
-    anchors = [a for kind in fit.anchors for a in home.of(kind)] if fit.anchors else [""]
+    anchors = _anchors(home, fit)
     sides = [fit]
     if fit.target is not None:
         sides.append(dataclasses.replace(fit, target=(fit.target[0], -fit.target[1])))
