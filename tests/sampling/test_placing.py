@@ -153,3 +153,17 @@ def test_the_number_of_processes_changes_nothing():
     alone, two = (sample(scene, texts, 4, seed=1, jobs=jobs) for jobs in (1, 2))
     assert np.array_equal(alone.pool.physics.qpos, two.pool.physics.qpos)
     assert alone.rejected == two.rejected
+
+
+def test_a_box_stands_next_to_what_is_little_higher_than_its_middle():
+    """The box's rays leave its middle, 28 mm up, and meet a fish that is 29 mm high."""
+    scene = load_scene("small_home", objects=["container_date"])
+    small = make_sampler(scene)
+    fish = sampled(small, "(on_floor fish_0 kitchen_0)")[0]
+    assert fish is not None
+    small.start_from(fish.physics, fish.states)
+    high = small.query.box(scene.object_index("fish_0"))[1][2]
+    row, reasons = sampled(small, "(next_to container_date_0 fish_0)")
+    assert row is not None, reasons
+    middle = float(np.asarray(small.query.view.object_com)[0, scene.object_index("container_date_0"), 2])
+    assert middle < high < middle + 0.002

@@ -99,6 +99,7 @@ class PlacementArea:
       loose: where neither full support nor balance is found, physics may decide where the object comes to rest, as in a
         bowl or a basket; the supports are containers.
       holds_at_once: the predicate does not depend on contact, so that it can be asked before physics.
+      lowered: it is asked then where the object comes to rest, `LIFT` below where it is let go.
     """
 
     low: Float[np.ndarray, "2"]
@@ -109,6 +110,7 @@ class PlacementArea:
     push_towards: int = -1
     loose: bool = False
     holds_at_once: bool = False
+    lowered: bool = False
     contents: tuple[int, ...] = ()
 
 
@@ -117,11 +119,11 @@ Areas = Callable[[Footprint, np.random.Generator], Iterator[PlacementArea]]
 
 
 def holding_at_once(areas: Areas) -> Areas:
-    """A rule's areas, with the predicate asked before physics, too (`PlacementArea.holds_at_once`)."""
+    """A rule's areas, with the predicate asked before physics, too (`PlacementArea.holds_at_once`, `lowered`)."""
 
     def asked(shape: Footprint, rng: np.random.Generator) -> Iterator[PlacementArea]:
         for area in areas(shape, rng):
-            yield dataclasses.replace(area, holds_at_once=True)
+            yield dataclasses.replace(area, holds_at_once=True, lowered=True)
 
     return asked
 
@@ -314,7 +316,7 @@ class Placer:
         else:
             return "collides"
         loose = support == "loose" and area.loose
-        if area.holds_at_once and not task.truth():
+        if area.holds_at_once and not self._would_hold(task, pos, quat, area.lowered):
             turn = next(task.at_once)
             if not loose or turn % FALLS_IN:
                 task.budget.work += turn % AT_ONCE > 0
@@ -345,6 +347,16 @@ class Placer:
         if not task.truth():
             return "predicate false"
         return ""
+
+    def _would_hold(self, task: _Task, pos: np.ndarray, quat: np.ndarray, lowered: bool) -> bool:
+        """Whether the predicate holds before physics; `lowered`: see `PlacementArea`. Of two things that lie flat, the
+        rays of one may pass above the other where it is let go, and meet it where it rests."""
+        if not lowered:
+            return task.truth()
+        task.moves.put(self.query, pos - np.array([0.0, 0.0, LIFT]), quat)
+        holds = task.truth()
+        task.moves.put(self.query, pos, quat)
+        return holds
 
     def _pushed(self, moves: Carried, pos: np.ndarray, quat: np.ndarray, other: int) -> Float[np.ndarray, "3"]:
         """The position after the object has been pushed level against another one, until they all but touch."""
