@@ -45,7 +45,10 @@ def test_wrong_options_name_what_is_near(tmp_path, capsys):
         (["train", "CookingMeat", "--set", "utd_ration=3"], "utd_ratio"),
         (["train", "CookingMeat", "--algo", "bc"], "needs --demos"),
         (["train", "CookingMeat", "--algo", "bc", "--expert"], "expert=true is for sac"),
-        (["train", "CookingMeat", "--begin-with", "CookingMeat"], "--init-from is for --algo dagger"),
+        (
+            ["train", "CookingMeat", "--algo", "ppo", "--begin-with", "CookingMeat"],
+            "--init-from is for --algo dagger and sac",
+        ),
         (["train", "CookingMeat", "--algo", "dagger", "--init-from", "CookingMeet"], "near matches: CookingMeat"),
         (["train", "CookingMeat", "--set", "programs=3"], "programs=3"),
         (["train", "CookingMeat", "--minutes", "nan"], "--minutes nan"),

@@ -18,6 +18,7 @@ from small_envs import SeenPointMass
 from ig2mj.errors import InputError
 from ig2mj.learn.policies import Policy
 from ig2mj.learn.running_stats import RunningStats
+from ig2mj.learn.sac import SAC, SACConfig
 from ig2mj.learn.warm_start import init_from_policy
 
 
@@ -78,3 +79,26 @@ def test_who_guesses_nothing_needs_no_scales_of_what_is_hidden(tmp_path):
     assert begun.moments.mean.shape == learner.moments.mean.shape and np.isfinite(begun.moments.mean).all()
     for ours, theirs in zip(jax.tree.leaves(begun.actor), jax.tree.leaves(learner.actor), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=2e-3, err_msg="half precision")
+
+
+def test_sac_begins_as_a_policy_whose_predicting_layers_are_not_in_its_file(tmp_path):
+    """The actor does as the policy does; what critics alone see is scaled by what the run sees."""
+    perception = made("none", encoder="small").perception
+    config = SACConfig(encoder="small", actor_layers=(16,), critic_layers=(16,), image_shift=0)
+    algorithm = SAC(perception, 2, config, begun=True)
+    learner = jax.jit(algorithm.init)(jax.random.PRNGKey(7))
+    samples = jnp.asarray(np.random.default_rng(0).normal(3.0, 2.0, (500, perception.vector_size)), jnp.float32)
+    learner = dataclasses.replace(learner, moments=learner.moments.update(samples))
+    Policy.of(algorithm, learner, depends(algorithm), {}).save(tmp_path / "policy.npz")
+    loaded = Policy.load(tmp_path / "policy.npz")
+    assert not any(name.startswith("guess/") for name in loaded.weights)
+    begun = init_from_policy(algorithm, loaded, 0)
+    seen = perception({**SeenPointMass(4).reset(1).obs, "privileged_state": jnp.ones((4, 7))})
+    after, before = (algorithm._look(x.actor, x.moments, seen)[0] for x in (begun, learner))
+    np.testing.assert_allclose(after, before, atol=0.01, err_msg="half precision")
+    other = begun.moments.update(samples + 1.0)
+    size = perception.actor_size
+    np.testing.assert_allclose(
+        other.mean[:size], learner.moments.mean[:size], atol=0.01, err_msg="of a million samples"
+    )
+    np.testing.assert_allclose(other.mean[size:], samples.mean(0)[size:] + 1.0, rtol=1e-4, err_msg="of these alone")

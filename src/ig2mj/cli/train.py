@@ -85,8 +85,8 @@ def run(
       devices: number of GPUs, or all: of this machine, or of all processes started together (docs/guide/scale.md).
       demos: file of `ig2mj demos collect`: bc learns from it alone; sac and dagger start as its clone and keep
         replaying it.
-      init_from: for dagger: a policy's file, a run's folder or the name of a policy that ships, whose networks are
-        trained further; --set object_memory=poses adds a memory that it did not have.
+      init_from: for dagger and sac: a policy's file, a run's folder or the name of a policy that ships, whose networks
+        are trained further; with dagger, --set object_memory=poses adds a memory that it did not have.
       stop_at_success: stop once this share of the last episodes succeeds, e.g. 0.98.
       videos: minutes between two videos of a held-out episode, written to the run's folder videos; default: none. A
         process of low priority makes them; they need OpenGL and ffmpeg.
@@ -231,7 +231,7 @@ def _train(chosen: RunOptions, out: pathlib.Path | None, resume: bool, changes: 
         perception = Perception(world.observation_spaces, obs, *images)
         shown = load_demos(chosen.demos, perception, world_of(world)) if chosen.demos is not None else None
         parts = world, shown, AXIS if shared else None, settings.expert, occlusion
-        algorithm = make_algorithm(config, perception, *parts)
+        algorithm = make_algorithm(config, perception, *parts, begun=former is not None)
         folder = out or pathlib.Path("runs") / "-".join(
             [world.task.name, world.robot, world.grasping, algo, obs, str(seed)]
         )
@@ -318,9 +318,9 @@ def _check(chosen: RunOptions, settings: RunSettings, out: pathlib.Path | None) 
     if chosen.demos is not None and algo == "ppo":
         raise Ig2mjError(f"--demos: {algo} takes none (bc, dagger and sac do)")
     if chosen.demos is not None and chosen.init_from is not None:
-        raise Ig2mjError("--demos, --init-from: dagger begins with one of them")
-    if chosen.init_from is not None and algo != "dagger":
-        raise Ig2mjError(f"--init-from is for --algo dagger, not {algo}: a policy's file holds no critics")
+        raise Ig2mjError("--demos, --init-from: a run begins with one of them")
+    if chosen.init_from is not None and algo not in ("dagger", "sac"):
+        raise Ig2mjError(f"--init-from is for --algo dagger and sac, not {algo}")
     if settings.expert and algo != "sac":
         others = {"dagger": "dagger always has one", "ppo": "ppo learns alone", "bc": "bc learns from --demos"}
         raise Ig2mjError(f"expert=true is for sac: {others[algo]}")

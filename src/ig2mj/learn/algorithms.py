@@ -96,12 +96,15 @@ def make_algorithm(
     axis: str | None = None,
     expert: bool = False,
     occlusion: OcclusionConfig = NO_OCCLUSION,
+    *,
+    begun: bool = False,
 ) -> Any:
     """The algorithm of these settings for an environment.
 
     Args:
       env: an `ig2mj.envs.environment.Environment`. demos: for SAC and DAgger. axis: of several devices.
       expert: the task's expert helps SAC; DAgger always has it. occlusion: for DAgger.
+      begun: SAC's actor begins as a policy (`ig2mj.learn.warm_start`).
 
     Raises:
       UnknownNameError: the task has no expert, and one is needed; see also `check_settings`.
@@ -116,7 +119,7 @@ def make_algorithm(
         encoder = glimpses.encoder_of(perception)
     if isinstance(config, SACConfig):
         adviser = _expert_of(env) if expert else None
-        return SAC(perception, size, config, axis, demos, adviser, horizon=horizon, encoder=encoder)
+        return SAC(perception, size, config, axis, demos, adviser, horizon=horizon, encoder=encoder, begun=begun)
     if isinstance(config, PPOConfig):
         return PPO(perception, size, config, axis)
     helper, unlabelled, memory, o = _expert_of(env), None, None, occlusion

@@ -213,7 +213,7 @@ class Dagger:
         return ImitationBuffer.empty(*shape, unlabelled, *sizes, shown=shown, groups=groups)
 
     def cloned(self, learner: DaggerLearner, actor: Any, moments: RunningStats) -> DaggerLearner:
-        """What begins with the actor of a clone, and the means that it was made with."""
+        """What begins with the actor of a clone or of a policy, and the means that it was made with."""
         return self.with_fresh_average(dataclasses.replace(learner, actor=actor, moments=moments))
 
     @property

@@ -48,6 +48,9 @@ FORMAT_VERSION = 1
 
 CARD = "card.json"
 
+PREDICTION_LAYERS = "guess/"
+"""Begins the names of the layers that predict; they are in a file only where the actor acts on the prediction."""
+
 HIDDEN = ("hidden_mean", "hidden_deviation")
 """Names in a file of the scales of the privileged numbers that are predicted."""
 
@@ -200,7 +203,7 @@ class Policy:
         net |= actor.encoder.card() if actor.encoder is not None else {}
         weights = {k: np.asarray(v) for k, v in flat(learner.actor).items()}
         if not actor.acts_on_prediction:
-            weights = {k: w for k, w in weights.items() if not k.startswith("guess/")}
+            weights = {k: w for k, w in weights.items() if not k.startswith(PREDICTION_LAYERS)}
         if actor.bins:
             net["choices"] = actor.bins
         if memory is not None:

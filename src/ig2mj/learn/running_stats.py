@@ -28,16 +28,16 @@ def normal(values: Float[Array, "*b x"], mean: Float[Array, "x"], deviation: Flo
 
 @struct.dataclass
 class RunningStats:
-    """Mean and variance of every number of a vector. `count`: how many samples they are of."""
+    """Mean and variance of every number of a vector. `count`: how many samples those of each number are of."""
 
     mean: Float[Array, "v"]
     var: Float[Array, "v"]
-    count: Float[Array, ""]
+    count: Float[Array, "v"]
 
     @classmethod
     def initial(cls, size: int) -> RunningStats:
         """Of nothing yet: `normal` changes nothing."""
-        return cls(jnp.zeros(size), jnp.ones(size), jnp.float32(0))
+        return cls(jnp.zeros(size), jnp.ones(size), jnp.zeros(size))
 
     def update(self, values: Float[Array, "*b v"], axis: str | None = None) -> RunningStats:
         """With more samples."""
@@ -60,10 +60,10 @@ class RunningStats:
         return self.mean[:size], jnp.sqrt(self.var[:size] + FLOOR)
 
     @classmethod
-    def of(cls, mean: Float[Array, "v"], deviation: Float[Array, "v"], count: float) -> RunningStats:
-        """With these `scales`, as of so many samples."""
+    def of(cls, mean: Float[Array, "v"], deviation: Float[Array, "v"], count: Float[Array, "v"]) -> RunningStats:
+        """With these `scales`, as of so many samples; 0: the first samples alone count."""
         var = jnp.maximum(jnp.square(jnp.asarray(deviation, jnp.float32)) - FLOOR, 0.0)
-        return cls(jnp.asarray(mean, jnp.float32), var, jnp.float32(count))
+        return cls(jnp.asarray(mean, jnp.float32), var, jnp.asarray(count, jnp.float32))
 
 
 RARE = 500

@@ -7,8 +7,9 @@ normalization, returns over three steps, rewards scaled to the atoms' range, a t
 deviation of 0.15, exploration noise that is repeated for a random number of steps.
 
 With an expert, episodes begin under it, and its labels pull the actor (`bc_coef`), both annealed to zero over the run
-(`ig2mj.learn.guidance`). With demonstrations the actor begins as their clone, the critics learn alone for a while, and
-up to half of a batch is demonstrations, a share that is annealed to zero over training. An iteration is
+(`ig2mj.learn.guidance`). With demonstrations the actor begins as their clone, and up to half of a batch is
+demonstrations, a share that is annealed to zero over training. Where the actor begins as a clone or as a policy, the
+critics learn alone for a while. An iteration is
 `rollout_length` steps of all worlds, then `utd_ratio` updates for each of them. Time limits do not end the value: where
 an episode was cut off, the last observation is evaluated; after success nothing comes.
 
@@ -57,7 +58,8 @@ class SACConfig:
       tau: share of the critics that goes into the targets at an update. policy_delay: updates per update of the actor.
       init_alpha: weight of the entropy at first. target_std: deviation of actions that the target entropy belongs to.
       max_noise_repeat: longest time that exploration noise is repeated, in steps.
-      critic_head_start: updates of the critics before the actor learns, where it begins as a clone of demonstrations.
+      critic_head_start: updates of the critics before the actor learns, where it begins as a clone of demonstrations or
+        as a policy.
       expert_decay: share of the run over which an expert helps. expert_steps: of an episode that it acts at most, at
         first. expert_noise: deviation of what is added to its actions.
       bc_coef: weight of its labels in the actor's loss, at first. bc_decay: share of the run until that is 0.
@@ -159,16 +161,18 @@ class SAC:
         *,
         horizon: int = 0,
         encoder: Encoder | None = None,
+        begun: bool = False,
     ):
         """
         Args:
           axis: the name of an axis of devices over which gradients are averaged.
           demos, adviser: demonstrations and an expert, see the module's text.
           horizon: agent steps of an episode; success counts once so many have passed without the expert.
-          encoder: of images; None: as `config` names it.
+          encoder: of images; None: as `config` names it. begun: the actor begins as a policy, as with demonstrations.
         """
         self.perception, self.action_size, self.axis = perception, action_size, axis
         self._demos, self.adviser, self._horizon = demos, as_adviser(adviser), horizon
+        self._begun = begun or demos is not None
         self.config = c = config or SACConfig()
         predictions = perception.targets.size if perception.targets and c.aux_coef else 0
         encoder = encoder or conv_encoder(perception.image_shape, c.encoder, predictions)
@@ -226,7 +230,7 @@ class SAC:
         return SACBuffers(replay, RewardScale.initial(num_worlds), demos)
 
     def cloned(self, learner: SACLearner, actor: Any, moments: RunningStats) -> SACLearner:
-        """With an actor that was cloned, and the means that it was cloned with."""
+        """With the actor of a clone or of a policy, and the means that it was made with."""
         return dataclasses.replace(learner, actor=actor, moments=moments)
 
     def acting_state(self, num_worlds: int) -> Noise:
@@ -318,10 +322,9 @@ class SAC:
         sample_key, target_key, actor_key = jax.random.split(key, 3)
         size = share_of(c.batch_size, self.axis)
         batch = buffers.replay.sample(sample_key, c.policy_delay * size, c.n_step, c.gamma)
-        late = True
         if buffers.demos is not None:
             batch = self._with_demos(batch, buffers.demos, sample_key, progress)
-            late = learner.updates >= c.critic_head_start
+        late = learner.updates >= c.critic_head_start if self._begun else True
         batch = dataclasses.replace(batch, reward=batch.reward * buffers.scale.factor(c.v_max))
         action, density, _, _ = self._draw(learner.actor, learner.moments, batch.after, target_key)  # of all at once
         alpha = jnp.exp(learner.log_alpha)

@@ -1,7 +1,7 @@
 """Training that starts from a policy's networks instead of untrained ones: `ig2mj train --init-from`.
 
 A policy's file holds what acts: the actor and the scales of what it sees and predicts. All else that an algorithm
-keeps, such as the optimizer's state and labels, starts from nothing.
+keeps, such as critics, the optimizer's state and labels, starts from nothing.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ig2mj.errors import InputError
-from ig2mj.learn.policies import Policy, flat, nested
+from ig2mj.learn.policies import PREDICTION_LAYERS, Policy, flat, nested
 from ig2mj.learn.running_stats import RunningStats
 
 KNOWN = 1e6
@@ -28,13 +28,16 @@ def init_from_policy(algorithm: Any, policy: Policy, seed: int, file: object = "
     """An algorithm's learner with a policy's actor.
 
     Args:
-      algorithm: DAgger, made for what the policy was made for (`Policy.check`). file: of the policy, for messages.
+      algorithm: SAC or DAgger, made for what the policy was made for (`Policy.check`).
+      file: of the policy, for messages.
 
     Raises:
       InputError: its networks have other layers, or its scales are not in the file.
     """
     learner = jax.jit(algorithm.init)(jax.random.PRNGKey(seed))
-    mine, theirs = flat(learner.actor), policy.weights
+    mine, theirs = flat(learner.actor), dict(policy.weights)
+    if not algorithm.actor.acts_on_prediction:
+        theirs |= {name: have for name, have in mine.items() if name.startswith(PREDICTION_LAYERS)}
     if mine.keys() != theirs.keys():
         other = sorted(mine.keys() ^ theirs.keys())[0]
         raise InputError(file, "has other networks", element=other, fix=_settings(policy))
@@ -49,18 +52,18 @@ def init_from_policy(algorithm: Any, policy: Policy, seed: int, file: object = "
             raise InputError(file, words, element=name, fix=_settings(policy))
         new[name] = jnp.asarray(weights)
     hidden = algorithm.perception.vector_size - algorithm.perception.actor_size
-    mean, deviation = policy.mean, policy.deviation
+    mean, deviation, count = policy.mean, policy.deviation, np.full(algorithm.perception.vector_size, KNOWN)
     if hidden:
         unseen = policy.hidden
         if unseen is None and algorithm.actor.acts_on_prediction:
             raise InputError(file, "lacks the scales of its prediction", fix="train it again")
-        if unseen is None:  # it predicts nothing
+        if unseen is None:  # no action depends on them
             unseen = np.zeros(hidden, np.float32), np.ones(hidden, np.float32)
+            count[-hidden:] = 0.0
         mean, deviation = (np.concatenate(pair) for pair in zip((mean, deviation), unseen, strict=True))
-    scales = RunningStats.of(mean, deviation, KNOWN)
+    learner = algorithm.cloned(learner, nested(new), RunningStats.of(mean, deviation, count))
     # with one update done, the policy acts from the first step on
-    learner = dataclasses.replace(learner, actor=nested(new), moments=scales, updates=jnp.int32(1))
-    return algorithm.with_fresh_average(learner)
+    return dataclasses.replace(learner, updates=jnp.int32(1))
 
 
 def _settings(policy: Policy) -> str:
