@@ -14,6 +14,7 @@ import numpy as np
 from ig2mj.planning.bodies import RUSH
 from ig2mj.planning.carrying import carried_way
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
+from ig2mj.planning.long_things import stood_up
 from ig2mj.planning.moves import UP, Program, go_home, strayed, vector3
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.phases import Base, Phase
@@ -57,7 +58,7 @@ AT_LEAST, SLOWEST = 100, 0.02
 def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     """Drives to a stance; returns the reason why it did not get there. A base that something has stopped backs
     off, and tries again, once."""
-    reason = yield from _go(world, stance)
+    reason = yield from _go(world, stance, stands_up=True)
     if reason != "timeout":
         return reason
     here, yaw = world.base
@@ -66,7 +67,8 @@ def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     return (yield from _go(world, stance))
 
 
-def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
+def _go(world: PlannedWorld, stance: Stance, stands_up: bool = False) -> Generator[Program, str, str]:
+    """See `go`. stands_up: where there is no way with what the hands hold, long things are turned upright."""
     here, yaw = world.base
     apart = float(np.linalg.norm(here - stance.xy))
     turned = abs((yaw - stance.yaw + np.pi) % (2 * np.pi) - np.pi)
@@ -77,6 +79,8 @@ def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
         carries = bool(name) and not world.domain.fixed(name) and world.held.count(name) == 1
         if (not name or carries) and strayed(world, hand):
             yield go_home(world, hand)
+            if carries and name not in world.held:
+                return "slipped"
     if stoops:
         yield [stretch(0.0)]
     last = [stretch(stance.rise)] if rises else []
@@ -104,6 +108,8 @@ def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     way = None if start is None or end is None else turning.way(start.xy, end.xy)
     if way is None and world.body.sideways and (carried := _carried(world, standing, stance)):
         return (yield [*_keeping(world, carried), *last])
+    if way is None and stands_up and world.body.opening is None and (yield from _stood_up(world)):
+        return (yield from _go(world, stance))
     if way is None:  # what is held may touch something where the way turns
         way = world.floor(holding=True, ahead=True).way(here, stance.xy)
         way = standing.way(here, stance.xy) if way is None else way
@@ -113,6 +119,16 @@ def _go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
     program = [] if start.xy == (here[0], here[1]) else [shift(start)]
     program += drive(way, stance.yaw, RUSH if world.crosses else None)
     return (yield [*_keeping(world, [*program, *([] if end.xy == stance.xy else [shift(stance)])]), *last])
+
+
+def _stood_up(world: PlannedWorld) -> Generator[Program, str, bool]:
+    """Turns long things that hands hold upright; returns whether there was one."""
+    turned = False
+    for hand, name in enumerate(world.held):
+        if name and world.held.count(name) == 1 and not world.domain.fixed(name) and (turns := stood_up(world, hand)):
+            yield turns
+            turned = True
+    return turned
 
 
 def _carried(world: PlannedWorld, standing: FreeFloor, stance: Stance) -> Program:
@@ -208,6 +224,6 @@ def drive(points: np.ndarray, yaw: float | None, speed: float | None = None) -> 
     return program
 
 
-def shift(stance: Stance) -> Phase:
-    """Goes straight to a stance without turning to its way."""
-    return Phase(Base.SHIFT, xy=stance.xy, yaw=stance.yaw, tolerance=0.025, turn_tolerance=0.06)
+def shift(stance: Stance, keeps: int = -1) -> Phase:
+    """Goes straight to a stance without turning to its way; `keeps`: `Phase.keeps`."""
+    return Phase(Base.SHIFT, xy=stance.xy, yaw=stance.yaw, keeps=keeps, tolerance=0.025, turn_tolerance=0.06)

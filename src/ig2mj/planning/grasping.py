@@ -10,6 +10,7 @@ import numpy as np
 
 from ig2mj.planning.cleaning_area import leaves_free
 from ig2mj.planning.clearance import Obstacles, straight
+from ig2mj.planning.drawing_out import drawn_out, has_room
 from ig2mj.planning.driving import go
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.grasps import AT_OBJECT, GraspPose, grasp_poses, ordered
@@ -209,18 +210,30 @@ def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generat
     if way is None:
         return "no_path", f"the hand has no path to {name}"
     lift = LIFT * UP * float(pose.palm @ UP > -0.9)
-    reason = yield [
+    takes = [
         *closing_on(world, name, hand, pose, way),
         *([Phase(hand=hand, pos=vector3(pose.at(-pose.deep)), close=True, until=Until.WAITED, limit=FIRM)]
           if world.body.friction else []),
         *([Phase(hand=hand, pos=vector3(pose.at(0.0) + lift), keeps=index, close=True, tolerance=0.02, limit=10,
                  after="", speed=0.03)] if lift.any() else []),
+    ]  # fmt: skip
+    points, carries = [p + lift for p in way[-2::-1]], carry(world, hand, keeps=index, name=name, grip=pose.point)
+    leaves = [
         Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=True, tolerance=0.04, limit=30, after="",
               speed=0.03),
-        *travel(hand, [p + lift for p in way[-2::-1]], None, keeps=index),
+        *travel(hand, points, None, keeps=index),
         *_making_room(world, name, hand),
-        carry(world, hand, keeps=index, name=name, grip=pose.point),
+        carries,
     ]  # fmt: skip
+    if world.body.opening is not None:
+        reason = yield [*takes, *leaves]
+    else:
+        reason = yield takes
+        if not reason and name in world.held:
+            carries = carry(world, hand, keeps=index)
+            ends = [start + lift, *points, world.carried(hand, world.stance)]
+            out = None if has_room(world, name, hand, ends) else drawn_out(world, name, hand, carries)
+            reason = yield leaves if out is None else [*_making_room(world, name, hand), *out]
     if name in world.held:
         return "", ""
     back = vector3(world.grip(hand) - pose.before * pose.palm)

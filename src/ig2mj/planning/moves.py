@@ -220,7 +220,7 @@ def go_home(world: PlannedWorld, hand: int) -> Program:
     is found, raised first, off what it is at."""
     name = world.held[hand]
     home = [carry(world, hand)] if name else rest(hand)
-    way = _way_home(world, hand, name) if world.body.opening is None else None
+    way = way_home(world, hand, name) if world.body.opening is None else None
     if way is not None:
         return [*travel(hand, way, None), *home]
     up = vector3(world.grip(hand) + RAISED_OFF * UP)
@@ -229,20 +229,30 @@ def go_home(world: PlannedWorld, hand: int) -> Program:
 
 def go_home_past(world: PlannedWorld, hand: int, came: Sequence[Vector]) -> Generator[Program, str, None]:
     """As `go_home`; where no way home is free, the hand first goes back the way that it came to where it is."""
-    if came and world.body.opening is None and _way_home(world, hand, world.held[hand]) is None:
+    if came and world.body.opening is None and way_home(world, hand, world.held[hand]) is None:
         yield travel(hand, came[-2::-1], None)
     yield go_home(world, hand)
 
 
-def _way_home(world: PlannedWorld, hand: int, name: str) -> list[Vector] | None:
-    """Points between where a floating hand is, turned as it is, and where it rests or carries what it holds."""
-    stance = world.stance
+def way_home(world: PlannedWorld, hand: int, name: str, moved: Vector | None = None) -> list[Vector] | None:
+    """Points between where a floating hand is, turned as it is, and where it rests or carries what it holds; None:
+    there is no such way.
+
+    Args:
+      name: what it holds; "": nothing. moved: by which the base has gone with the hand, m, which then comes straight up
+        or level, and what touches something where it is now does not count; None: it has not.
+    """
+    off = np.zeros(3) if moved is None else moved
+    x, y = world.stance.xy + off[:2]
+    stance = dataclasses.replace(world.stance, xy=(float(x), float(y)))
     start = world.carried(hand, stance) if name else world.resting(hand, stance)
-    obstacles, grip = world.obstacles([name] if name else [], stance), world.grip(hand)
+    obstacles, grip = world.obstacles([name] if name else [], stance), world.grip(hand) + off
     spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
-    back = [UP, -ahead(stance.yaw)]
+    back = [UP, -ahead(stance.yaw)] if moved is None else [UP]
     for share in (1.0, TOUCHES):
         there = spheres * (1.0, 1.0, 1.0, share)
+        if moved is not None:
+            there = there[obstacles.distance(there[:, :3] + grip - off) > there[:, 3]]
         way = hand_path(obstacles, there, start, grip, back, search=obstacles.clear(there + np.array([*grip, 0.0])))
         if way is not None:
             return way[-2::-1]

@@ -1,0 +1,76 @@
+"""Ways of what a hand has just taken to where it is carried: along the hand's own way, where that has room for it, else
+around what is in the way. What stands below something that it cannot pass, such as a carton below the keyboard of a
+piano, is drawn out first: the base goes back with it just above the floor.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.geometry.host_rotations import about_vertical
+from ig2mj.planning.clearance import straight
+from ig2mj.planning.driving import shift
+from ig2mj.planning.moves import TOUCHES, Program, ahead, travel, way_home
+from ig2mj.planning.occupancy import RESOLUTION
+from ig2mj.planning.phases import Phase
+from ig2mj.planning.world import HELD_MARGIN, PlannedWorld, Stance, Vector
+
+FARTHEST, STEP = 1.2, 0.15
+"""m that the base goes back at most, and between the places at which the hand may have a way."""
+
+ASIDE = (0.0, np.pi / 4, -np.pi / 4, np.pi / 2, -np.pi / 2)
+"""rad from straight back in which the base goes."""
+
+
+def has_room(world: PlannedWorld, name: str, hand: int, points: Sequence[Vector]) -> bool:
+    """Whether what a hand holds keeps clear along points of the hand's way, as it is turned now; what it touches where
+    it is does not count there."""
+    obstacles, held = world.obstacles([name]), _held(world, name, hand)
+    return all(straight(obstacles, held, a, b) for a, b in itertools.pairwise([world.grip(hand), *points]))
+
+
+def drawn_out(world: PlannedWorld, name: str, hand: int, carries: Phase) -> Program | None:
+    """The way of a floating hand to where it carries what it holds; None: none is found.
+
+    Args:
+      carries: the phase in which the hand goes there.
+    """
+    way = way_home(world, hand, name, np.zeros(3))
+    if way is not None:
+        return [*travel(hand, way, None, keeps=carries.keeps), carries]
+    for there in _back(world, name, hand):
+        moved = np.array([*np.subtract(there.xy, world.stance.xy), 0.0])
+        way = way_home(world, hand, name, moved)
+        if way is not None:
+            goes = shift(there, keeps=carries.keeps)
+            return [goes, *travel(hand, way, None, keeps=carries.keeps), carries]
+    return None
+
+
+def _back(world: PlannedWorld, name: str, hand: int) -> list[Stance]:
+    """Stances to which the base can go straight with what a hand holds where it is, the nearest first."""
+    floor, stance, grip = world.floor(), world.stance, world.grip(hand)
+    obstacles, held = world.obstacles([name]), _held(world, name, hand)
+    here, found, blocked = np.array(stance.xy), list[Stance](), set[float]()
+    for apart in np.arange(STEP, FARTHEST + STEP / 2, STEP):
+        for turn in ASIDE:
+            way = -about_vertical(turn) @ ahead(stance.yaw)
+            x, y = here + apart * way[:2]
+            free = floor.nearest((float(x), float(y)), RESOLUTION) is not None
+            if turn in blocked or not free or not straight(obstacles, held, grip, grip + apart * way):
+                blocked.add(turn)
+                continue
+            found.append(Stance((float(x), float(y)), stance.yaw, stance.rise))
+    return found
+
+
+def _held(world: PlannedWorld, name: str, hand: int) -> Float[np.ndarray, "n 4"]:
+    """Points of what a hand holds about its grasp point, with a radius, but for those that touch something."""
+    points, grip = world.points(name), world.grip(hand)
+    radius = TOUCHES * HELD_MARGIN
+    apart = world.obstacles([name]).distance(points) > radius
+    return np.column_stack([points - grip, np.full(len(points), radius)])[apart]
