@@ -306,3 +306,15 @@ def test_what_is_lost_while_its_container_is_opened_is_taken_again(monkeypatch, 
     outcome = ended.value.value
     assert outcome.done == stays and len(taken) == (1 if stays else 3)
     assert stays or (outcome.reason, outcome.detail) == ("slipped", "the hand lost can")
+
+
+def test_what_a_hand_has_let_go_bars_its_way_back_where_it_stands_there(world):
+    low, high = world.vertices("book").min(0), world.vertices("book").max(0)
+    beside = np.array([high[0] + 0.15, (low[1] + high[1]) / 2, high[2]])
+    at = dataclasses.replace(world)
+    at.grip = lambda hand: beside
+    at.hand_axes = lambda hand, rotation=None: (np.array([0.0, 0.0, 1.0]), np.array([-1.0, 0.0, 0.0]))
+    up, across = beside + (0.0, 0.0, 0.4), beside - (0.4, 0.0, 0.0)
+    assert not placing._is_caught(at, "book", 1, [up])
+    assert placing._is_caught(at, "book", 1, [across, up])
+    assert not placing._is_caught(at, "ball", 1, [across, up])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
 import numpy as np
@@ -38,7 +39,7 @@ from ig2mj.planning.moves import (
     turning_point,
     vector3,
 )
-from ig2mj.planning.opening import Tried, is_shut, open_into
+from ig2mj.planning.opening import Tried, is_shut, open_into, withdraw
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.spots import Spot, ends_down, grip_for, is_tipped, put_there, spots_for, spots_upon
 from ig2mj.planning.stances import stances
@@ -126,7 +127,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             if planned is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
-            reason = yield letting_go(world, name, hand, planned, falls=spot.drop > 0.0)
+            reason = yield from letting_go(world, name, hand, planned, falls=spot.drop > 0.0)
             placed, detail = put_there(world.facts, step, until or predicate)
             if not placed:
                 reason = reason or "not_true_after"
@@ -141,15 +142,19 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
     return place
 
 
-def letting_go(world: PlannedWorld, name: str, hand: int, planned: Letting, falls: bool) -> Program:
-    """A hand brings what it holds where it lets it go, from where the robot stands, and goes back.
+def letting_go(
+    world: PlannedWorld, name: str, hand: int, planned: Letting, falls: bool
+) -> Generator[Program, str, str]:
+    """A hand brings what it holds where it lets it go, from where the robot stands, and goes back; returns why it did
+    not. Where what it has let go is in its way back, as the pocket of a bag above it, it first goes off that.
 
     Args:
       falls: it does not stand or lie there by itself.
     """
     start, way, target, quat, back = planned
     keeps, turned = world.index(name), quaternion(quat)
-    return [
+    waits = Phase(until=Until.WAITED, limit=FALLING if falls else 6)
+    reason = yield [
         *turn_at(world, hand, start, turned, keeps),
         *travel(hand, way, turned, keeps=keeps),
         Phase(hand=hand, pos=vector3(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1, limit=20,
@@ -157,10 +162,24 @@ def letting_go(world: PlannedWorld, name: str, hand: int, planned: Letting, fall
         Phase(hand=hand, close=False, until=Until.EMPTY, limit=10),
         Phase(hand=hand, close=False, until=Until.WAITED, limit=OPENS),
         Phase(hand=hand, pos=vector3(back), tolerance=0.04, limit=15, after=""),
-        *travel(hand, [*way[-2::-1], start], None),
-        *rest(hand),
-        Phase(until=Until.WAITED, limit=FALLING if falls else 6),
     ]  # fmt: skip
+    if reason:
+        return reason
+    returns = [*way[-2::-1], start]
+    if world.body.opening is None and _is_caught(world, name, hand, returns):
+        off = withdraw(world, hand)
+        if off != rest(hand):
+            return (yield [*off, waits])
+    return (yield [*travel(hand, returns, None), *rest(hand), waits])
+
+
+def _is_caught(world: PlannedWorld, name: str, hand: int, way: Sequence[Vector]) -> bool:
+    """Whether an object that a hand has let go is in the hand's way."""
+    others = set(range(len(world.domain.model.tables.object_names))) - {world.index(name)}
+    own, grip = world.planner.obstacles(world.view, others, world.world), world.grip(hand)
+    spheres = world.spheres(*world.hand_axes(hand)) * (1.0, 1.0, 1.0, TOUCHES)
+    spheres = spheres[own.distance(spheres[:, :3] + grip) > spheres[:, 3]]
+    return not all(straight(own, spheres, a, b) for a, b in itertools.pairwise([grip, *way]))
 
 
 Letting = tuple[Vector, list[Vector], Vector, Sequence[float] | np.ndarray, Vector]
@@ -326,7 +345,7 @@ def let_fall(world: PlannedWorld, name: str, hand: int, tilt: Rotation) -> Gener
             return False
         planned = yield from from_home(world, hand, functools.partial(way_to_spot, world, name, hand, spot))
         if planned is not None:
-            yield letting_go(world, name, hand, planned, falls=True)
+            yield from letting_go(world, name, hand, planned, falls=True)
             return name not in world.held
         turn = about_vertical(world.base[1] - yaw)
         tilt = turn @ tilt @ turn.T

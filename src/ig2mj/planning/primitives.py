@@ -27,6 +27,7 @@ from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
 from ig2mj.planning.treatments import cook, freeze, slice_, soak
+from ig2mj.planning.turning_open import opens
 from ig2mj.planning.world import AWAY, PlannedWorld
 
 
@@ -91,7 +92,7 @@ ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {
     "place_next_to": place("next_to"),
     "place_under": place("under"),
     "place_on_floor": place("on_floor"),
-    "open": set_open(True),
+    "open": opens,
     "close": set_open(False),
     "toggle_on": toggle(True),
     "toggle_off": toggle(False),
