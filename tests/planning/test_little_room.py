@@ -314,7 +314,7 @@ def test_what_a_hand_has_let_go_bars_its_way_back_where_it_stands_there(world):
     at = dataclasses.replace(world)
     at.grip = lambda hand: beside
     at.hand_axes = lambda hand, rotation=None: (np.array([0.0, 0.0, 1.0]), np.array([-1.0, 0.0, 0.0]))
-    up, across = beside + (0.0, 0.0, 0.4), beside - (0.4, 0.0, 0.0)
+    up, across = (beside + np.array(way) for way in ((0.0, 0.0, 0.4), (-0.4, 0.0, 0.0)))
     assert not placing._is_caught(at, "book", 1, [up])
     assert placing._is_caught(at, "book", 1, [across, up])
     assert not placing._is_caught(at, "ball", 1, [across, up])
