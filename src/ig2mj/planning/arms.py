@@ -43,8 +43,14 @@ from ig2mj.scene.scene import Scene
 
 UP, FORWARDS = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 
-EVERY = 4
-"""Agent steps between the postures of a way whose links are checked."""
+EVERY, HAND_EVERY = 4, 2
+"""Agent steps between the postures of a way whose links are checked, and in which the hand is."""
+
+PART, PART_TOLERANCE = 0.12, 0.05
+"""m between points of a way of a hand that carries something, at most, and within which it is at one of them."""
+
+STRAYS = 0.02
+"""m by which a hand may come nearer to what is around where its arm brings it than on the straight way."""
 
 POSTURES = 8
 """In which the links of an arm are looked at that has its hand at a pose, at most."""
@@ -170,10 +176,11 @@ class ArmBody(WheeledBody):
         return self._corners @ _frame(fingers, palm).T
 
     def prepared(self, program: Sequence[Phase]) -> list[Phase]:
-        """A hand that goes to rest is moved there, and one that keeps its orientation keeps that of the last phase."""
+        """A hand that goes to rest is moved there, one that keeps its orientation keeps that of the last phase, and one
+        that keeps what it holds goes long ways in parts: inverse kinematics bring it off a straight line."""
         from dataclasses import replace
 
-        found, quat = [], None
+        found, quat, last = [], None, None
         for phase in program:
             if phase.reset:
                 w, x, y, z = self._rest_quat
@@ -186,6 +193,11 @@ class ArmBody(WheeledBody):
                 phase = replace(phase, quat=quat)
             if phase.base == Base.SHIFT:
                 phase = replace(phase, tolerance=max(phase.tolerance, SHIFT_TOLERANCE))
+            goal = None if phase.hand < 0 or phase.pos is None or phase.in_body else np.array(phase.pos)
+            if last is not None and goal is not None and phase.keeps >= 0:
+                part = replace(phase, tolerance=max(phase.tolerance, PART_TOLERANCE), after="")
+                found += [replace(part, pos=(float(x), float(y), float(z))) for x, y, z in in_parts(last, [goal])[:-1]]
+            last = goal
             found.append(phase)
         return found
 
@@ -235,24 +247,55 @@ class ArmFollower:
         found = self._model.solve(self._own(point[None])[0], self._quat, self._q)
         return any(self._clear(q[None]) for q in found[:POSTURES])
 
-    def __call__(self, points: Sequence[np.ndarray]) -> bool:
-        """Whether the hand gets along points of the world from where it is, and the links have room."""
-        found = self._followed(points)
-        return found is not None and self._clear(np.concatenate([found[EVERY::EVERY], found[-1:]]))
+    def __call__(
+        self,
+        points: Sequence[np.ndarray],
+        spheres: Float[np.ndarray, "S 4"],
+        turned_at: Float[np.ndarray, "3"] | None = None,
+    ) -> bool:
+        """Whether the hand gets along points of the world from where it is, and links and hand have room. See
+        `Follower`."""
+        turned = None if turned_at is None else self._followed([turned_at], self._q)
+        points = points if turned_at is None else in_parts(turned_at, points)
+        found = self._followed(points, self._q if turned is None else turned[-1])
+        if found is None or not self._clear(np.concatenate([found[EVERY::EVERY], found[-1:]])):
+            return False
+        return self._hand_is_clear(np.concatenate([found[HAND_EVERY::HAND_EVERY], found[-1:]]), spheres)
 
     def passes(self, points: Sequence[np.ndarray]) -> bool:
         """See `Follower.passes`."""
-        return self._followed(points) is not None
+        return self._followed(points, self._q) is not None
 
-    def _followed(self, points: Sequence[np.ndarray]) -> Float[np.ndarray, "T J"] | None:
+    def _followed(self, points: Sequence[np.ndarray], q: Float[np.ndarray, "J"]) -> Float[np.ndarray, "T J"] | None:
         own = self._own(np.array(points))
-        return self._model.follow(self._q, own, np.tile(self._quat, (len(own), 1)))
+        return self._model.follow(q, own, np.tile(self._quat, (len(own), 1)))
+
+    def _hand_is_clear(self, joints: Float[np.ndarray, "T J"], spheres: Float[np.ndarray, "S 4"]) -> bool:
+        """Whether a hand, with spheres as if it were turned as it is to be, has room where joints bring it."""
+        pos, quat = self._model.hand(joints)
+        base = np.broadcast_to(self._base, quat.shape)
+        middle = np.asarray(quat_rotate(base, pos), float) + self._pos
+        off = quat_multiply(quat_multiply(base, quat), quat_conjugate(quat_multiply(self._base, self._quat)))
+        centres = middle[:, None] + np.asarray(quat_rotate(off[:, None], spheres[None, :, :3]), float)
+        radius = spheres[:, 3] - STRAYS
+        radius = np.where(spheres[:, 3] < HELD, radius, np.maximum(radius, HELD))
+        return self._obstacles.clear(np.column_stack([centres.reshape(-1, 3), np.tile(radius, len(joints))]))
 
     def _clear(self, joints: np.ndarray) -> bool:
         spheres = self._links.placed(joints)
         turn = np.broadcast_to(self._base, (len(spheres), 4))
         centres = np.asarray(quat_rotate(turn, spheres[:, :3]), float) + self._pos
         return self._obstacles.clear(np.column_stack([centres, spheres[:, 3]]))
+
+
+def in_parts(start: Float[np.ndarray, "3"], points: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """The same points with others between them, which are at most `PART` apart on straight lines."""
+    found, before = list[np.ndarray](), np.asarray(start, float)
+    for point in points:
+        count = max(1, int(np.ceil(np.linalg.norm(point - before) / PART)))
+        found += [before + k / count * (point - before) for k in range(1, count)] + [point]
+        before = point
+    return found
 
 
 def _frame(fingers: Direction, palm: Direction) -> Float[np.ndarray, "3 3"]:

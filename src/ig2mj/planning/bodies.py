@@ -118,8 +118,19 @@ class Follower(Protocol):
         """Whether the hand can be at a point of the world, m."""
         ...
 
-    def __call__(self, points: Sequence[np.ndarray]) -> bool:
-        """Whether it goes along points of the world, m, the first of which is not where it is, with room for it."""
+    def __call__(
+        self,
+        points: Sequence[np.ndarray],
+        spheres: Float[np.ndarray, "S 4"],
+        turned_at: Float[np.ndarray, "3"] | None = None,
+    ) -> bool:
+        """Whether it goes along points of the world, m, the first of which is not where it is, with room for it, and
+        for the hand where the arm brings it: off the straight lines between the points.
+
+        Args:
+          spheres: of the hand with what it holds, turned as it is to be, about its grasp point. turned_at: where the
+            hand is turned before it goes on; None: it is turned on its way.
+        """
         ...
 
     def passes(self, points: Sequence[np.ndarray]) -> bool:

@@ -106,7 +106,8 @@ def hold_at(
             start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
             back = [UP, -ahead(stance.yaw)]
             follows = world.follows(hand, world.turned_hand(hand, turned), standing, stance)
-            return hand_path(standing, spheres, start, target, back, search=search, follows=follows) is not None
+            way = hand_path(standing, spheres, start, target, back, search=search, follows=follows, turns=True)
+            return way is not None
 
         most = WAYS if world.body.opening is None else ARM_WAYS
         found: _Holding | None = first_way(filter(has_room, candidates()), has_way, most)
@@ -138,7 +139,7 @@ def _way(
     spheres = _spheres(world, name, hand, turned)
     follows = world.follows(hand, world.turned_hand(hand, turned), obstacles)
     start = turning_point(obstacles, spheres, world.grip(hand), world.base[1])
-    way = hand_path(obstacles, spheres, start, target, back, search=True, follows=follows)
+    way = hand_path(obstacles, spheres, start, target, back, search=True, follows=follows, turns=True)
     return None if way is None else (start, way)
 
 

@@ -77,13 +77,14 @@ def hand_path(
     spare: float = 0.0,
     search: bool = False,
     follows: Follower | None = None,
+    turns: bool = False,
 ) -> list[Vector] | None:
     """Points of a hand's way, without the first; None: no way was found. See `ig2mj.planning.clearance.hand_way`.
 
     Args:
       entries: unit vectors from the goal, along which a hand comes straight to it where nothing else is free.
       search: ways around obstacles are searched for (`ig2mj.planning.hand_search`), where via points find none.
-      follows: of the arm that carries the hand; None: it floats.
+      follows: of the arm that carries the hand; None: it floats. turns: the hand is turned at the start (`turn_at`).
     """
     if follows is not None:
         if spare == 0.0 and not obstacles.clear(spheres + np.array([*goal, 0.0])):
@@ -92,11 +93,11 @@ def hand_path(
             return None
 
     def accepts(way: list[Vector]) -> bool:
-        return follows is None or follows(way)
+        return follows is None or follows(way, spheres, start if turns else None)
 
     if spare > 0.0:  # what is put down comes to right above its place first
         over = goal + OVER * UP
-        way = hand_path(obstacles, spheres, start, over, entries, search=search, follows=follows)
+        way = hand_path(obstacles, spheres, start, over, entries, search=search, follows=follows, turns=turns)
         if way is not None:
             return [*way, goal]
     way = hand_way(obstacles, spheres, start, goal, spare, accepts=accepts)

@@ -91,7 +91,7 @@ SLIDES = (0.3, 0.15)
 
 STANCES, WAYS, ARM_WAYS = 20, 6, 12
 """Stances for each grip, and ways of a hand that are looked for, at most: of one that floats with each grip, and of one
-on an arm with one kind of grip."""
+on an arm with one kind of grip, of those at whose beginning the arm has a posture."""
 
 
 def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
@@ -341,14 +341,16 @@ def _plan(
                 stance = reaching_all(world, hand, stance, np.array([p for p, _ in places]), obstacles)
                 if stance is None:
                     continue
-                count += 1
-                if count > (WAYS if floats else ARM_WAYS):
-                    break
                 spheres = world.spheres(fingers, -normal)
                 before = first + ABOVE * normal
                 back = [-ahead(stance.yaw), normal, UP]
                 quat = world.body.turned(hand, fingers, -normal)
                 follows = world.follows(hand, quat, obstacles, stance)
+                if follows is not None and not follows.reaches(before):
+                    continue
+                count += 1
+                if count > (WAYS if floats else ARM_WAYS):
+                    break
                 way = hand_path(obstacles, spheres, world.resting(hand, stance), before, back, follows=follows)
                 if way is None or (follows is not None and not follows.passes([*way, *(p for p, _ in places)])):
                     continue

@@ -197,7 +197,7 @@ def way_to_spot(world: PlannedWorld, name: str, hand: int, spot: Spot) -> Lettin
     obstacles = world.obstacles([name], world.stance)
     start = turning_point(obstacles, spheres, world.grip(hand), yaw)
     follows = world.follows(hand, quat, obstacles)
-    way = hand_path(obstacles, spheres, start, target, [UP, -ahead(yaw)], SPARE, True, follows)
+    way = hand_path(obstacles, spheres, start, target, [UP, -ahead(yaw)], SPARE, True, follows, turns=True)
     if way is None:
         return None
     return start, way, target, quat, _drawn_back(obstacles, world.spheres(fingers, palm), target, palm)
@@ -421,6 +421,6 @@ def _plan(
         start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
         follows = world.follows(hand, quat, standing, stance)
         goal = target + (LET_GO + spot.drop) * UP
-        return hand_path(standing, spheres, start, goal, back, SPARE, search, follows) is not None
+        return hand_path(standing, spheres, start, goal, back, SPARE, search, follows, turns=True) is not None
 
     return first_way(candidates(), has_way, WAYS if floats else ARM_WAYS, search) or lacking
