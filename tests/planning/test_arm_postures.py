@@ -1,20 +1,28 @@
 """Inverse kinematics of an arm on wheels: postures for poses that its joints reach."""
 
 import numpy as np
+import pytest
 
 import ig2mj
 from ig2mj.agents import Fetch
 from ig2mj.agents.task_robot import TaskRobot
-from ig2mj.planning.arms import ArmBody
+from ig2mj.planning.arms import PART, ArmBody, in_parts
 from ig2mj.planning.body_kinds import body_of
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.phases import Phase
 
 
-def test_almost_all_poses_that_an_arm_reaches_have_a_posture(tiny_home_folder):
+@pytest.fixture(scope="module")
+def body(tiny_home_folder):
     scene = ig2mj.load_scene(tiny_home_folder, agents=[Fetch().at(-0.45, 0.0, 0.0)])
     robot = scene.agents[0]
     assert isinstance(robot, TaskRobot)
-    body = body_of(scene, robot.controller(scene.tables, 0, 0.1))
-    assert isinstance(body, ArmBody)
+    found = body_of(scene, robot.controller(scene.tables, 0, 0.1))
+    assert isinstance(found, ArmBody)
+    return found
+
+
+def test_almost_all_poses_that_an_arm_reaches_have_a_posture(body):
     model, rng = body.model, np.random.default_rng(1)
     turns = np.isinf(model.chain.upper)
     low, high = np.where(turns, -np.pi, model.chain.lower), np.where(turns, np.pi, model.chain.upper)
@@ -26,3 +34,58 @@ def test_almost_all_poses_that_an_arm_reaches_have_a_posture(tiny_home_folder):
     at, _ = model.hand(np.array([f[0] for f in found if len(f)]))
     reached = pos[ahead][[len(f) > 0 for f in found]]
     assert np.linalg.norm(at - reached, axis=1).max() < 0.015
+
+
+class _Ball(Obstacles):
+    """Nothing but a point."""
+
+    def __init__(self, at):
+        self._at = at
+
+    def clear(self, spheres):
+        return bool((np.linalg.norm(spheres[:, :3] - self._at, axis=1) > spheres[:, 3]).all())
+
+
+def follower(body: ArmBody, at, quat, monkeypatch):
+    """Of the arm at rest of a robot at the origin, whose links have room."""
+    found = body.follower(np.zeros(0), True, (np.zeros(3), 0.0), quat, _Ball(np.asarray(at, float)))
+    monkeypatch.setattr(found, "_clear", lambda joints: True)
+    return found
+
+
+def test_a_hand_needs_room_where_its_arm_brings_it(body, monkeypatch):
+    """Inverse kinematics bring a hand off the straight line to a point near the robot's base."""
+    hand, far = np.array([[0.0, 0.0, 0.0, 0.1]]), np.full(3, 9.0)
+    quat = np.array(body.turned(0, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, -1.0]) / np.sqrt(2)))
+    model, start = body.model, body.model.hand(body._at_rest[None])[0][0]
+    goals = [np.array([x, y, z]) for x in (0.45, 0.6, 0.75) for y in (-0.3, 0.0, 0.3) for z in (0.15, 0.5, 0.9)]
+    strayed = 0.0
+    for goal in goals:
+        joints = model.follow(body._at_rest, goal[None], quat[None])
+        if joints is None:
+            continue
+        along, middle = goal - start, model.hand(joints)[0]
+        share = np.clip((middle - start) @ along / (along @ along), 0.0, 1.0)
+        off = np.linalg.norm(middle - (start + share[:, None] * along), axis=1)
+        worst = int(np.argmax(off))
+        if off[worst] < 0.1:
+            continue
+        strayed = max(strayed, float(off[worst]))
+        on_line = start + share[worst] * along
+        assert follower(body, far, quat, monkeypatch)([goal], hand)
+        assert not follower(body, middle[worst], quat, monkeypatch)([goal], hand)
+        if np.linalg.norm(middle - on_line, axis=1).min() > 0.12:
+            assert follower(body, on_line, quat, monkeypatch)([goal], hand)
+    assert strayed > 0.1
+
+
+def test_what_a_hand_carries_goes_in_parts(body):
+    """Of the program, phases that keep what is held and follow another of the hand."""
+    ends = [(0.6, 0.0, 1.0), (0.6, 0.0, 0.5)]
+    parts = body.prepared([Phase(hand=0, pos=p, keeps=3) for p in ends])
+    points = np.array([p.pos for p in parts])
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= PART + 1e-9
+    assert parts[0].pos == ends[0] and parts[-1] == Phase(hand=0, pos=ends[1], keeps=3)
+    assert all(p.after == "" and p.keeps == 3 for p in parts[1:-1])
+    assert len(body.prepared([Phase(hand=0, pos=p) for p in ends])) == len(ends)
+    assert np.allclose(in_parts(np.zeros(3), [np.array([0.2, 0.0, 0.0])])[0], (0.1, 0.0, 0.0))

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from ig2mj.engine.view import PhysicsView
-from ig2mj.planning import execution
+from ig2mj.planning import driving, execution
 from ig2mj.planning.arm_kinds import FetchArmKind
 from ig2mj.planning.bodies import MOST, WheeledBody
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.planning.senses import Senses
+from ig2mj.planning.world import PlannedWorld, Stance
 
 
 @pytest.fixture
@@ -48,3 +49,57 @@ def test_what_a_hand_holds_is_turned_and_driven_slowly(body):
     for held, forward, turn in ((False, MOST, MOST), (True, *(FetchArmKind.carrying or ()))):
         assert body.command(senses(held=held), ahead)[0] == pytest.approx([forward, 0.0])
         assert body.command(senses(held=held), behind)[0] == pytest.approx([0.0, turn])
+
+
+class _Open:
+    """Floor without obstacles: ways are straight."""
+
+    def way(self, start, goal):
+        return np.array([start, goal], float)
+
+    def nearest(self, xy, within):
+        return np.zeros(2, int)
+
+
+class _Carries(PlannedWorld):
+    """A robot that looks along x, with no room for a whole turn with what it holds."""
+
+    def __init__(self):
+        pass
+
+    @property
+    def base(self):
+        return np.zeros(2), 0.0
+
+    def floor(self, **_):
+        return _Open()
+
+
+def swung(monkeypatch, blocked, goal: Stance) -> list[Phase]:
+    monkeypatch.setattr(driving, "clear_with_held", lambda _, stances: not any(blocked(s) for s in stances))
+    return driving._swung(_Carries(), _Open(), goal)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_base_turns_by_the_longer_side_where_what_it_holds_has_no_room_on_the_shorter_one(monkeypatch):
+    goal = Stance((0.0, 2.0), np.pi / 2)
+    wall = lambda s: s.xy == (0.0, 0.0) and 0.5 < s.yaw % (2 * np.pi) < 1.0  # noqa: E731
+    program = swung(monkeypatch, wall, goal)
+    turns = [p.yaw for p in program if p.base == Base.TURN]
+    assert turns[:3] == pytest.approx([-np.pi / 2, -np.pi, -3 * np.pi / 2]), "each part is less than half a turn"
+    assert [p.xy for p in program if p.base == Base.DRIVE] == [(0.0, 2.0)]
+
+
+def test_a_base_backs_off_until_what_it_holds_has_room_to_turn(monkeypatch):
+    near = lambda s: s.xy[0] > -0.25 and 0.5 < s.yaw % (2 * np.pi) < 5.5  # noqa: E731
+    program = swung(monkeypatch, near, Stance((-2.0, 2.0), np.pi))
+    assert program[0].base == Base.SHIFT and program[0].xy == pytest.approx((-0.3, 0.0)) and program[0].yaw == 0.0
+    assert [p.base for p in program[1:]] == [Base.TURN, Base.DRIVE, Base.TURN]
+
+
+def test_a_base_comes_from_behind_where_what_it_holds_has_no_room_to_turn_at_the_end(monkeypatch):
+    goal = Stance((2.0, 2.0), np.pi / 2)
+    corner = lambda s: s.xy[1] > 1.75 and s.yaw < 1.5  # noqa: E731
+    program = swung(monkeypatch, corner, goal)
+    assert program[-1].base == Base.SHIFT and program[-1].xy == pytest.approx(goal.xy)
+    assert [p.xy for p in program if p.base == Base.DRIVE] == [pytest.approx((2.0, 1.7))]
+    assert not swung(monkeypatch, lambda s: abs(s.yaw) > 0.2, goal)

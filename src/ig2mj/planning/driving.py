@@ -38,8 +38,14 @@ SLIGHT = 0.02
 
 FORWARDS = np.array([1.0, 0.0, 0.0])
 
-STEP = 0.1
-"""m between stances at which what is held is checked."""
+STEP, TURN_STEP = 0.1, 0.12
+"""m and rad between stances at which what is held is checked."""
+
+SHORT = 0.06
+"""m before its end at which a base on wheels that goes straight back may stop."""
+
+OFF_TO_TURN = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6)
+"""m behind a stance at which a base on wheels may turn with what it holds."""
 
 
 ASIDE = 0.05
@@ -110,6 +116,8 @@ def _go(world: PlannedWorld, stance: Stance, stands_up: bool = False) -> Generat
         return (yield [*_keeping(world, carried), *last])
     if way is None and stands_up and world.body.opening is None and (yield from _stood_up(world)):
         return (yield from _go(world, stance))
+    if way is None and not world.body.sideways and (swung := _swung(world, standing, stance)):
+        return (yield [*_keeping(world, swung), *last])
     if way is None:  # what is held may touch something where the way turns
         way = world.floor(holding=True, ahead=True).way(here, stance.xy)
         way = standing.way(here, stance.xy) if way is None else way
@@ -144,6 +152,55 @@ def _carried(world: PlannedWorld, standing: FreeFloor, stance: Stance) -> Progra
         program.append(dataclasses.replace(shift(there), tolerance=0.05, turn_tolerance=0.12, limit=limit))
         before = there.xy
     return [*program, shift(stance)]
+
+
+def _swung(world: PlannedWorld, standing: FreeFloor, stance: Stance) -> Program:
+    """The program of a base on wheels that has nowhere room for a whole turn with what is held: it backs off as little
+    as that takes to turn to its way, and comes to the stance from behind, as far off as it takes to turn there; it
+    turns by the longer side where that is the one with room. Empty: there is no such way."""
+    (here, yaw), ahead = world.base, world.floor(holding=True, ahead=True)
+    for off in OFF_TO_TURN:
+        start = _behind(world, standing, Stance((float(here[0]), float(here[1])), yaw), off)
+        for before in OFF_TO_TURN if start is not None else ():
+            end = _behind(world, standing, stance, before)
+            if start is None or end is None:
+                continue
+            way = ahead.way(start.xy, end.xy)
+            way = standing.way(start.xy, end.xy) if way is None else way
+            if way is None:
+                return []
+            begins, arrives = (float(np.arctan2(*(b - a)[::-1])) for a, b in ((way[0], way[1]), (way[-2], way[-1])))
+            turns = _turn(world, start, begins)
+            if turns is None:
+                break
+            turned = _turn(world, dataclasses.replace(end, yaw=arrives), stance.yaw)
+            if turned is not None:
+                backs, comes = ([shift(s)] if apart > 0.0 else [] for s, apart in ((start, off), (stance, before)))
+                return [*backs, *turns, *drive(way, None), *turned, *comes]
+    return []
+
+
+def _behind(world: PlannedWorld, standing: FreeFloor, stance: Stance, off: float) -> Stance | None:
+    """A stance straight behind another, m, where the robot can stand and come from with what it holds; None: it
+    cannot."""
+    x, y = np.array(stance.xy) - off * np.array([np.cos(stance.yaw), np.sin(stance.yaw)])
+    there = dataclasses.replace(stance, xy=(float(x), float(y)))
+    if off == 0.0:
+        return there
+    free = standing.nearest(there.xy, RESOLUTION) is not None
+    return there if free and clear_with_held(world, _between(there, stance)[:-1]) else None
+
+
+def _turn(world: PlannedWorld, stance: Stance, yaw: float) -> Program | None:
+    """Phases that turn a base where it stands, so that what is held meets nothing: by the shorter side or the longer
+    one; None: by both it would."""
+    shorter = float((yaw - stance.yaw + np.pi) % (2 * np.pi) - np.pi)
+    for by in (shorter, shorter - np.copysign(2 * np.pi, shorter)):
+        yaws = stance.yaw + np.linspace(0.0, by, max(2, int(np.ceil(abs(by) / TURN_STEP)) + 1))[1:]
+        if clear_with_held(world, [dataclasses.replace(stance, yaw=float(y)) for y in yaws]):
+            parts = stance.yaw + by * np.array([1.0] if by == shorter else [1 / 3, 2 / 3, 1.0])
+            return [Phase(Base.TURN, yaw=float(y), turn_tolerance=0.06, limit=TURN_STEPS) for y in parts]
+    return None
 
 
 def _keeping(world: PlannedWorld, program: Program) -> Program:
@@ -198,7 +255,8 @@ def _backed(world: PlannedWorld, stance: Stance, standing: FreeFloor, turning: F
         there = Stance((float(x), float(y)), stance.yaw)
         if apart > 0 and standing.nearest(there.xy, RESOLUTION) is None:
             return None
-        if turning.nearest(there.xy, RESOLUTION) is None:
+        short = there.xy if world.body.sideways or apart == 0.0 else np.array(there.xy) - SHORT * back
+        if turning.nearest(there.xy, RESOLUTION) is None or turning.nearest(short, RESOLUTION) is None:
             continue
         return there if apart == 0 or clear_with_held(world, _between(there, stance)) else None
     return None
