@@ -9,6 +9,7 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.planning import driving, execution
 from ig2mj.planning.arm_kinds import FetchArmKind
 from ig2mj.planning.bodies import MOST, WheeledBody
+from ig2mj.planning.free_floor import FreeFloor
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.planning.senses import Senses
 from ig2mj.planning.world import PlannedWorld, Stance
@@ -51,8 +52,11 @@ def test_what_a_hand_holds_is_turned_and_driven_slowly(body):
         assert body.command(senses(held=held), behind)[0] == pytest.approx([0.0, turn])
 
 
-class _Open:
+class _Open(FreeFloor):
     """Floor without obstacles: ways are straight."""
+
+    def __init__(self):
+        pass
 
     def way(self, start, goal):
         return np.array([start, goal], float)
@@ -76,8 +80,8 @@ class _Carries(PlannedWorld):
 
 
 def swung(monkeypatch, blocked, goal: Stance) -> list[Phase]:
-    monkeypatch.setattr(driving, "clear_with_held", lambda _, stances: not any(blocked(s) for s in stances))
-    return driving._swung(_Carries(), _Open(), goal)  # pyright: ignore[reportArgumentType]
+    monkeypatch.setattr(driving, "clear_with_held", lambda _, stances, share=1.0: not any(blocked(s) for s in stances))
+    return driving._swung(_Carries(), _Open(), goal)
 
 
 def test_a_base_turns_by_the_longer_side_where_what_it_holds_has_no_room_on_the_shorter_one(monkeypatch):
@@ -103,3 +107,11 @@ def test_a_base_comes_from_behind_where_what_it_holds_has_no_room_to_turn_at_the
     assert program[-1].base == Base.SHIFT and program[-1].xy == pytest.approx(goal.xy)
     assert [p.xy for p in program if p.base == Base.DRIVE] == [pytest.approx((2.0, 1.7))]
     assert not swung(monkeypatch, lambda s: abs(s.yaw) > 0.2, goal)
+    nowhere = swung(monkeypatch, lambda s: s.xy[1] > 1.0 and s.yaw > 1.2, goal)
+    assert [p.base for p in nowhere] == [Base.TURN, Base.DRIVE, Base.TURN], "it turns there in any case"
+
+
+def test_a_way_begins_where_a_base_has_to_turn_to():
+    """Points of a way are middles of cells: the first one is next to where the robot is, to any side."""
+    assert driving._heading(np.array([[0.0, 0.0], [-0.02, 0.03], [1.0, 0.0]]), 2.0) == 0.0
+    assert driving._heading(np.array([[0.0, 0.0], [-0.02, 0.03]]), 2.0) == 2.0

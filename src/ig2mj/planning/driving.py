@@ -10,12 +10,13 @@ import dataclasses
 from collections.abc import Generator
 
 import numpy as np
+from jaxtyping import Float
 
 from ig2mj.planning.bodies import RUSH
 from ig2mj.planning.carrying import carried_way
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.long_things import stood_up
-from ig2mj.planning.moves import UP, Program, go_home, strayed, vector3
+from ig2mj.planning.moves import TOUCHES, UP, Program, go_home, strayed, vector3
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.planning.stances import clear_with_held
@@ -40,6 +41,9 @@ FORWARDS = np.array([1.0, 0.0, 0.0])
 
 STEP, TURN_STEP = 0.1, 0.12
 """m and rad between stances at which what is held is checked."""
+
+PASSED = 0.08
+"""m from a point on the way at which a base drives on to the next one."""
 
 SHORT = 0.06
 """m before its end at which a base on wheels that goes straight back may stop."""
@@ -157,50 +161,66 @@ def _carried(world: PlannedWorld, standing: FreeFloor, stance: Stance) -> Progra
 def _swung(world: PlannedWorld, standing: FreeFloor, stance: Stance) -> Program:
     """The program of a base on wheels that has nowhere room for a whole turn with what is held: it backs off as little
     as that takes to turn to its way, and comes to the stance from behind, as far off as it takes to turn there; it
-    turns by the longer side where that is the one with room. Empty: there is no such way."""
+    turns by the side with room, the shorter one first. Where it has none, what is held may be close to other things;
+    and where there is none at the end, it turns there as it is. Empty: it cannot turn to its way, or there is none."""
     (here, yaw), ahead = world.base, world.floor(holding=True, ahead=True)
-    for off in OFF_TO_TURN:
-        start = _behind(world, standing, Stance((float(here[0]), float(here[1])), yaw), off)
-        for before in OFF_TO_TURN if start is not None else ():
-            end = _behind(world, standing, stance, before)
-            if start is None or end is None:
-                continue
-            way = ahead.way(start.xy, end.xy)
-            way = standing.way(start.xy, end.xy) if way is None else way
-            if way is None:
-                return []
-            begins, arrives = (float(np.arctan2(*(b - a)[::-1])) for a, b in ((way[0], way[1]), (way[-2], way[-1])))
-            turns = _turn(world, start, begins)
-            if turns is None:
-                break
-            turned = _turn(world, dataclasses.replace(end, yaw=arrives), stance.yaw)
-            if turned is not None:
-                backs, comes = ([shift(s)] if apart > 0.0 else [] for s, apart in ((start, off), (stance, before)))
-                return [*backs, *turns, *drive(way, None), *turned, *comes]
-    return []
+    now, last = Stance((float(here[0]), float(here[1])), yaw), list[Phase]()
+    for share in (1.0, TOUCHES):
+        for off in OFF_TO_TURN:
+            start = _behind(world, standing, now, off, share)
+            for before in OFF_TO_TURN if start is not None else ():
+                end = _behind(world, standing, stance, before, share)
+                if start is None or end is None:
+                    continue
+                way = ahead.way(start.xy, end.xy)
+                way = standing.way(start.xy, end.xy) if way is None else way
+                if way is None:
+                    return []
+                turns = _turn(world, start, _heading(way, yaw), share)
+                if turns is None:
+                    break
+                begins = [*([shift(start)] if off > 0.0 else []), *turns, *drive(way, None)]
+                arrived = dataclasses.replace(end, yaw=_heading(way[::-1], yaw + np.pi) - np.pi)
+                ends = _turn(world, arrived, stance.yaw, share)
+                if ends is not None:
+                    return [*begins, *ends, *([shift(stance)] if before > 0.0 else [])]
+                if not last and before == 0.0:
+                    last = [*begins, _turns_to(stance.yaw)]
+    return last
 
 
-def _behind(world: PlannedWorld, standing: FreeFloor, stance: Stance, off: float) -> Stance | None:
+def _heading(way: Float[np.ndarray, "N 2"], yaw: float) -> float:
+    """Direction in which a way begins, rad, without points that a base passes at once; `yaw`: it is no longer."""
+    far = way[np.linalg.norm(way - way[0], axis=1) > PASSED]
+    return float(np.arctan2(*(far[0] - way[0])[::-1])) if len(far) else yaw
+
+
+def _behind(world: PlannedWorld, standing: FreeFloor, stance: Stance, off: float, share: float) -> Stance | None:
     """A stance straight behind another, m, where the robot can stand and come from with what it holds; None: it
-    cannot."""
+    cannot. `share`: of `clear_with_held`."""
     x, y = np.array(stance.xy) - off * np.array([np.cos(stance.yaw), np.sin(stance.yaw)])
     there = dataclasses.replace(stance, xy=(float(x), float(y)))
     if off == 0.0:
         return there
     free = standing.nearest(there.xy, RESOLUTION) is not None
-    return there if free and clear_with_held(world, _between(there, stance)[:-1]) else None
+    return there if free and clear_with_held(world, _between(there, stance)[:-1], share) else None
 
 
-def _turn(world: PlannedWorld, stance: Stance, yaw: float) -> Program | None:
+def _turn(world: PlannedWorld, stance: Stance, yaw: float, share: float) -> Program | None:
     """Phases that turn a base where it stands, so that what is held meets nothing: by the shorter side or the longer
     one; None: by both it would."""
     shorter = float((yaw - stance.yaw + np.pi) % (2 * np.pi) - np.pi)
     for by in (shorter, shorter - np.copysign(2 * np.pi, shorter)):
         yaws = stance.yaw + np.linspace(0.0, by, max(2, int(np.ceil(abs(by) / TURN_STEP)) + 1))[1:]
-        if clear_with_held(world, [dataclasses.replace(stance, yaw=float(y)) for y in yaws]):
+        if clear_with_held(world, [dataclasses.replace(stance, yaw=float(y)) for y in yaws], share):
             parts = stance.yaw + by * np.array([1.0] if by == shorter else [1 / 3, 2 / 3, 1.0])
-            return [Phase(Base.TURN, yaw=float(y), turn_tolerance=0.06, limit=TURN_STEPS) for y in parts]
+            return [_turns_to(float(y)) for y in parts]
     return None
+
+
+def _turns_to(yaw: float) -> Phase:
+    """A base turns where it stands, rad."""
+    return Phase(Base.TURN, yaw=yaw, turn_tolerance=0.06, limit=TURN_STEPS)
 
 
 def _keeping(world: PlannedWorld, program: Program) -> Program:
@@ -272,13 +292,15 @@ def drive(points: np.ndarray, yaw: float | None, speed: float | None = None) -> 
     """The program that follows a way, and at its end turns; `speed`: m in an agent step, None: `phases.SPEED`."""
     apart = np.linalg.norm(np.diff(points, axis=0), axis=1)
     program = [
-        Phase(Base.DRIVE, xy=(float(x), float(y)), tolerance=0.08, limit=AT_LEAST + int(length / SLOWEST), speed=speed)
+        Phase(
+            Base.DRIVE, xy=(float(x), float(y)), tolerance=PASSED, limit=AT_LEAST + int(length / SLOWEST), speed=speed
+        )
         for (x, y), length in zip(points[1:], apart, strict=True)
     ]
     if program:
         program[-1] = dataclasses.replace(program[-1], tolerance=0.025)
     if yaw is not None:
-        program.append(Phase(Base.TURN, yaw=float(yaw), turn_tolerance=0.06, limit=TURN_STEPS))
+        program.append(_turns_to(float(yaw)))
     return program
 
 

@@ -124,8 +124,12 @@ def behind_wall(
     return obstacles.stand_between(starts, point, world.walls, WALL)
 
 
-def clear_with_held(world: PlannedWorld, stances: Sequence[Stance]) -> bool:
-    """Whether what the robot holds, carried as it is now, meets nothing where the robot stands."""
+def clear_with_held(world: PlannedWorld, stances: Sequence[Stance], share: float = 1.0) -> bool:
+    """Whether what the robot holds, carried as it is now, meets nothing where the robot stands.
+
+    Args:
+      share: of the radii of what keeps clear.
+    """
     held = [(h, n) for h, n in enumerate(world.held) if n and not world.domain.fixed(n)]
     obstacles = world.obstacles([n for _, n in held])
     here, now = world.base
@@ -134,7 +138,7 @@ def clear_with_held(world: PlannedWorld, stances: Sequence[Stance]) -> bool:
         points = spheres[:, :3] + world.grip(hand) - np.array([*here, 0.0])
         for stance in stances:
             there = points @ about_vertical(stance.yaw - now).T + np.array([*stance.xy, 0.0])
-            if not obstacles.clear(np.concatenate([there, spheres[:, 3:]], axis=1)):
+            if not obstacles.clear(np.concatenate([there, share * spheres[:, 3:]], axis=1)):
                 return False
     return True
 
