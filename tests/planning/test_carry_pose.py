@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.grasping import _making_room
-from ig2mj.planning.moves import goes_on
+from ig2mj.planning.moves import goes_on, hand_path
 from ig2mj.planning.world import AWAY, BETWEEN, BODY_SPARE, PlannedWorld
 
 TRUNK = 0.3
@@ -67,6 +68,27 @@ def test_an_arm_has_to_reach_a_grasp_itself_not_only_the_place_before_it():
     before, grasp = np.array([0.75, 0.0, 0.0]), np.array([0.85, 0.0, 0.0])
     assert goes_on([before], before, _Arm()) and not goes_on([before], grasp, _Arm())
     assert goes_on([before], grasp, None) and not goes_on(None, before, None)
+
+
+class _StraysArm(_Arm):
+    """Brings the hand to where it has no room, whatever the way."""
+
+    def __call__(self, points, spheres, turned_at=None):
+        return self.passes(points) and not len(spheres)
+
+
+class _Nothing(Obstacles):
+    """Nothing is in the way."""
+
+    def __init__(self):
+        self._keep, self._body, self._carried = np.zeros(0, bool), None, np.zeros((0, 4))
+        self._low = self._high = np.zeros((0, 3))
+
+
+def test_a_hand_goes_where_its_arm_brings_it_off_the_line_only_where_nothing_else_is_found():
+    hand, start, goal = np.array([[0.0, 0.0, 0.0, 0.05]]), np.zeros(3), np.array([0.4, 0.0, 0.0])
+    for arm, search, found in ((_Arm, False, True), (_StraysArm, False, False), (_StraysArm, True, True)):
+        assert (hand_path(_Nothing(), hand, start, goal, search=search, follows=arm()) is not None) == found
 
 
 class _TwoHands(PlannedWorld):

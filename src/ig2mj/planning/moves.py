@@ -78,6 +78,7 @@ def hand_path(
     search: bool = False,
     follows: Follower | None = None,
     turns: bool = False,
+    strays: bool = False,
 ) -> list[Vector] | None:
     """Points of a hand's way, without the first; None: no way was found. See `ig2mj.planning.clearance.hand_way`.
 
@@ -85,6 +86,8 @@ def hand_path(
       entries: unit vectors from the goal, along which a hand comes straight to it where nothing else is free.
       search: ways around obstacles are searched for (`ig2mj.planning.hand_search`), where via points find none.
       follows: of the arm that carries the hand; None: it floats. turns: the hand is turned at the start (`turn_at`).
+      strays: room on straight lines is enough, wherever the arm brings the hand; with `search` also without this, at
+        last.
     """
     if follows is not None:
         if spare == 0.0 and not obstacles.clear(spheres + np.array([*goal, 0.0])):
@@ -93,7 +96,7 @@ def hand_path(
             return None
 
     def accepts(way: list[Vector]) -> bool:
-        return follows is None or follows(way, spheres, start if turns else None)
+        return follows is None or follows(way, spheres[: 0 if strays else None], start if turns else None)
 
     if spare > 0.0:  # what is put down comes to right above its place first
         over = goal + OVER * UP
@@ -119,7 +122,9 @@ def hand_path(
         way = search_way(obstacles, spheres, start, end)
         if way is not None and accepts(way if end is goal else [*way, goal]):
             return way if end is goal else [*way, goal]
-    return None
+    if follows is None or strays:
+        return None
+    return hand_path(obstacles, spheres, start, goal, entries, spare, search, follows, turns, strays=True)
 
 
 def goes_on(way: Sequence[Vector] | None, point: Vector, follows: Follower | None) -> bool:
