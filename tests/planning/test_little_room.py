@@ -9,7 +9,7 @@ import pytest
 import ig2mj
 from ig2mj.agents import Humanoid
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning import clutter, grasps, opening, placing, spots
+from ig2mj.planning import clutter, grasping, grasps, opening, placing, spots
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.domain import Domain
@@ -22,7 +22,7 @@ from ig2mj.planning.spots import spots_upon
 from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.taking import spheres_of
-from ig2mj.planning.world import AWAY, PlannedWorld
+from ig2mj.planning.world import AWAY, PlannedWorld, Stance
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.worlds.rules import Rules
 
@@ -318,3 +318,10 @@ def test_what_a_hand_has_let_go_bars_its_way_back_where_it_stands_there(world):
     assert not placing._is_caught(at, "book", 1, [up])
     assert placing._is_caught(at, "book", 1, [across, up])
     assert not placing._is_caught(at, "ball", 1, [across, up])
+
+
+def test_a_robot_stands_beside_what_it_takes_and_above_it_at_last(world):
+    """A board that it stood on, it would raise against its body."""
+    (x, y, _), far = world.com("book"), world.body.trunk[0] + 0.5
+    above, beside = Stance((float(x), float(y)), 0.0), Stance((float(x) - far, float(y)), 0.0)
+    assert list(grasping._beside_first(world, "book", [above, beside])) == [beside, above]

@@ -47,6 +47,7 @@ def test_a_backpack_stands_open_after_it_was_turned_over_and_is_filled():
     opened = simulation.agent.do("open", BAG)
     assert opened.done and simulation.predicate("open", BAG), opened
     assert upright(simulation) > STANDS
+    assert np.allclose(simulation.object_pose(BAG)[0][:2], (-0.2, 0.3), atol=0.1)
     assert simulation.agent.do("grasp", "apple_0").done
     put = simulation.agent.do("place_inside", "apple_0", BAG)
     assert put.done and simulation.predicate("inside", "apple_0", BAG), put

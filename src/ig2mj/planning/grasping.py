@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -280,7 +280,7 @@ def _plan(
         for k, point in enumerate((*aims, *hardly)):
             if k >= len(aims) and found:
                 break
-            for stance in stances(world, hand, point, floor, AWAY):
+            for stance in _beside_first(world, name, stances(world, hand, point, floor, AWAY)):
                 found = True
                 best = ordered(poses, stance.yaw, on_arm)
                 if prefers is not None:
@@ -297,6 +297,22 @@ def _plan(
         return goes_on(way, pose.at(0.0), follows)
 
     return first_way(candidates(), has_way, most)
+
+
+def _beside_first(world: PlannedWorld, name: str, proposed: Iterable[Stance]) -> Iterator[Stance]:
+    """Those first in which a robot whose hands float is not above the object, which it would raise against its body."""
+    if world.body.opening is not None:
+        yield from proposed
+        return
+    others = set(range(len(world.domain.model.tables.object_names))) - {world.index(name)}
+    own, height = world.planner.obstacles(world.view, others, world.world), world.com(name)[2]
+    above = list[Stance]()
+    for stance in proposed:
+        if float(own.distance(np.array([[*stance.xy, height]]))[0]) > world.body.trunk[0]:
+            yield stance
+        else:
+            above.append(stance)
+    yield from above
 
 
 def _reaching(world: PlannedWorld, hand: int, stance: Stance, pose: GraspPose, obstacles: Obstacles) -> Stance | None:

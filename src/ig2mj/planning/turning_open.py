@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -20,15 +20,17 @@ from jaxtyping import Float
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.clearance import straight
+from ig2mj.planning.driving import shift
 from ig2mj.planning.grasping import grasp, is_graspable
 from ig2mj.planning.grasps import GraspPose
 from ig2mj.planning.joints import OPEN_TO, OpenableJoint
-from ig2mj.planning.moves import LET_GO, OPENS, RETREAT, TOUCHES, UP, Primitive, Program, vector3
+from ig2mj.planning.moves import LET_GO, OPENS, RETREAT, TOUCHES, UP, Primitive, Program, ahead, vector3
+from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.opening import joints_of, set_open, withdraw
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.placing import place
 from ig2mj.planning.steps import Step
-from ig2mj.planning.world import BODY_SPARE, PlannedWorld, Rotation, Vector
+from ig2mj.planning.world import BODY_SPARE, PlannedWorld, Rotation, Stance, Vector
 
 TURNS = 2
 """Times that a container is turned over."""
@@ -45,6 +47,9 @@ LEVEL = 0.2
 FALLS = 0.8
 """Share of the torque of a flap's weight that the friction of its hinge may be, so that it falls."""
 
+STOOD = 0.97
+"""Cosine of the angle of a container's own vertical up to which it stands."""
+
 SIDE = 0.9
 """Cosine of the angle between a palm and a hinge up to which the palm is at an end of the hinge."""
 
@@ -59,6 +64,12 @@ HANGS = 8
 
 ABOVE_FLOOR = 0.1
 """m above the floor that is left below what is turned over."""
+
+BACK = (0.0, 0.15, 0.3, 0.45, 0.6)
+"""m by which the base goes back, so that it is not in the way of what is turned over."""
+
+HIGHER = (0.0, 0.2, 0.4)
+"""m by which it is turned over higher above where it stood, past what stands next to it."""
 
 OFFSETS = sorted(itertools.product((0.0, 0.15, 0.3), (0.0, 0.15, -0.15, 0.3, -0.3)), key=lambda o: np.hypot(*o))
 """m ahead and to the side of where something is carried, at which it may be turned over."""
@@ -112,16 +123,20 @@ def falling_flap(world: PlannedWorld, name: str) -> Flap | None:
 
 
 def turned_open(world: PlannedWorld, name: str) -> Generator[Program, str, None]:
-    """Takes a container, turns it over and back, and puts it down there: on a way, its flap would swing."""
-    flap = falling_flap(world, name)
+    """Takes a container, turns it over and back, and puts it down where it stood, or else there: while a base turns,
+    its flap would swing."""
+    flap, home = falling_flap(world, name), None
     if flap is None or (name not in world.held and all(world.held)):
         return
     if name not in world.held:
+        pos, quat = world.pose(name)
+        stood = matrices_on_host(quat[None])[0]
+        home = (pos, stood) if stood[2, 2] > STOOD else None
         by_side = functools.partial(_is_by_side, world, name, flap.joint.axis)
         if not (yield from grasp(world, Step("grasp", (name,)), by_side)).done:
             return
     hand, flap = world.held.index(name), falling_flap(world, name)
-    program = None if flap is None else _turning(world, name, hand, flap)
+    program = None if flap is None else _turning(world, name, hand, flap, home)
     if program is None:  # it is taken to where there is more room
         yield from place("on_floor")(world, Step("place_on_floor", (name, world.facts.room(name))))
         return
@@ -138,28 +153,59 @@ def _is_by_side(world: PlannedWorld, name: str, axis: Vector, pose: GraspPose) -
     return float(abs(float(pose.palm @ axis)) > SIDE and float(pose.point @ frame) > (along.min() + along.max()) / 2)
 
 
-def _turning(world: PlannedWorld, name: str, hand: int, flap: Flap) -> Program | None:
-    """The program in which a hand turns what it holds over and back, and puts it down; None: it has no room."""
-    frame, grip = matrices_on_host(world.pose(name)[1][None])[0], world.grip(hand)
-    joint, sign = flap.joint, np.sign(flap.joint.open - flap.joint.closed)
-    rotations = [r @ frame.T for r in turns(turn_onto(frame[:, 2], UP) @ frame, sign * frame.T @ joint.axis, flap.turn)]
+def _turning(
+    world: PlannedWorld, name: str, hand: int, flap: Flap, home: tuple[Vector, Rotation] | None
+) -> Program | None:
+    """The program in which a hand turns what it holds over and back, and puts it down; None: it has no room.
+
+    Args:
+      home: position and orientation of the object where it stood; None: it did not.
+    """
+    (own, quat), grip, joint = world.pose(name), world.grip(hand), flap.joint
+    frame, sign = matrices_on_host(quat[None])[0], np.sign(joint.open - joint.closed)
+    axis = sign * frame.T @ joint.axis
     swung = joint.moved(joint.vertices, joint.closed + OPEN_TO * (joint.open - joint.closed) - joint.now)
     points = np.concatenate([world.points(name), swung]) - grip
-    spheres = np.column_stack([points, np.full(len(points), TOUCHES * BODY_SPARE)])
-    far, obstacles = float(np.linalg.norm(points, axis=1).max()), world.obstacles([name], world.stance)
-    turned = [np.column_stack([spheres[:, :3] @ r.T, spheres[:, 3]]) for r in rotations]
-    low = float(((world.vertices(name) - grip) @ rotations[-1].T)[:, 2].min())
-    x, y = world.body.trunk[0] + BODY_SPARE + far, float(world.body.carry[hand][1])
-    every = range(len(world.domain.model.tables.object_names))
-    for ahead, aside in OFFSETS:
-        point = world.from_body(np.zeros(3)) + about_vertical(world.stance.yaw) @ (x + ahead, y + aside, 0.0)
-        floor = obstacles.below(point[:2], float(point[2]), every)
-        point[2] = max(floor + far + ABOVE_FLOOR, float(grip[2]))
-        there = np.array([*point[:2], floor - low + LET_GO])
-        free = all(obstacles.clear(some + np.array([*point, 0.0])) for some in turned)
-        if free and straight(obstacles, turned[-1], point, there):
-            return _program(world, name, hand, point, there, rotations)
-    return None
+    far, stance = float(np.linalg.norm(points, axis=1).max()), world.stance
+    radius, obstacles = np.full((len(points), 1), TOUCHES * BODY_SPARE), world.obstacles([name])
+
+    def plan(upright: Rotation, end: Callable[[Rotation], Iterator[tuple[Stance, Vector, Vector]]]) -> Program | None:
+        """With the container turned from upright, at the first places with room, of those from where and where it is
+        turned, and where it is let go (given the rotation from now to the last orientation)."""
+        rotations = [r @ frame.T for r in turns(upright, axis, flap.turn)]
+        turned = [np.concatenate([points @ r.T, radius], axis=1) for r in rotations]
+        for at, point, there in end(rotations[-1]):
+            around = obstacles.about(at.xy, *world.body.trunk)
+            free = all(around.clear(some + np.array([*point, 0.0])) for some in turned)
+            if free and straight(around, turned[-1], point, there, LET_GO):
+                goes = [shift(at, keeps=world.index(name))] if at is not stance else []
+                return [*goes, *_program(world, name, hand, point, there, rotations)]
+        return None
+
+    def above_home(last: Rotation) -> Iterator[tuple[Stance, Vector, Vector]]:
+        assert home is not None
+        there, floor = home[0] + last @ (grip - own) + LET_GO * UP, world.floor()
+        for back, more in itertools.product(BACK, HIGHER):
+            x, y = np.array(stance.xy) - back * ahead(stance.yaw)[:2]
+            at = dataclasses.replace(stance, xy=(float(x), float(y))) if back > 0.0 else stance
+            point = np.array([*there[:2], float(home[0][2]) + far + ABOVE_FLOOR + more])
+            stands = back == 0.0 or floor.nearest(at.xy, RESOLUTION) is not None
+            if stands and world.reaches(hand, at, point) and world.reaches(hand, at, there):
+                yield at, point, there
+
+    def in_front(last: Rotation) -> Iterator[tuple[Stance, Vector, Vector]]:
+        low = float(((world.vertices(name) - grip) @ last.T)[:, 2].min())
+        x, y = world.body.trunk[0] + BODY_SPARE + far, float(world.body.carry[hand][1])
+        for more, aside in OFFSETS:
+            point = world.from_body(np.zeros(3)) + about_vertical(world.stance.yaw) @ (x + more, y + aside, 0.0)
+            floor = obstacles.below(point[:2], float(point[2]), range(len(world.domain.model.tables.object_names)))
+            point[2] = max(floor + far + ABOVE_FLOOR, float(grip[2]))
+            yield stance, point, np.array([*point[:2], floor - low + LET_GO])
+
+    program = None
+    if home is not None:
+        program = plan(home[1] @ turns(np.eye(3), axis, flap.turn)[-1].T, above_home)
+    return program or plan(turn_onto(frame[:, 2], UP) @ frame, in_front)
 
 
 def _program(
@@ -175,11 +221,11 @@ def _program(
             Phase(hand=hand, until=Until.WAITED, keeps=keeps, limit=HANGS),
         ]
     palm = world.hand_axes(hand, rotations[-1])[1]
-    down = Phase(hand=hand, pos=vector3(there), quat=program[-2].quat, keeps=keeps, turn_tolerance=UPRIGHT, after="")
+    stands = dataclasses.replace(program[-2], turn_tolerance=UPRIGHT, limit=60)
     return [
         *program,
-        dataclasses.replace(down, limit=60),
-        dataclasses.replace(down, tolerance=0.015, limit=20, speed=0.03),
+        dataclasses.replace(stands, pos=vector3(there), tolerance=0.03),
+        dataclasses.replace(stands, pos=vector3(there), tolerance=0.015, limit=20, speed=0.03),
         Phase(hand=hand, close=False, until=Until.EMPTY, limit=10),
         Phase(hand=hand, close=False, until=Until.WAITED, limit=OPENS),
         Phase(hand=hand, pos=vector3(there - RETREAT * palm), tolerance=0.03, limit=20, after="", speed=SLOW),
