@@ -1,12 +1,17 @@
 """Bags are opened by turning them over: their flap falls open, and stays above its hinge."""
 
+import types
+
 import numpy as np
 import pytest
 
 import ig2mj
 from ig2mj.agents.humanoid import Humanoid
 from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.planning import turning_open
+from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.turning_open import PARTS, turns
+from ig2mj.planning.world import PlannedWorld
 
 UP = np.array([0.0, 0.0, 1.0])
 BAG, STANDS = "backpack_0", 0.99
@@ -30,6 +35,36 @@ def test_a_bag_is_turned_head_down_the_long_way_and_back_over_its_side(turn):
     assert abs(found[PARTS + 2] @ axis) == pytest.approx(1.0)
     back = [g - (g @ axis) * axis for g in found[PARTS + 2 :]]
     assert all(np.allclose(np.cross(g, UP), 0.0) and g @ UP < 1e-9 for g in back)
+
+
+class _World(PlannedWorld):
+    """A robot whose hands float, with an apple in one of them."""
+
+    def __init__(self):
+        self.body = types.SimpleNamespace(opening=None)
+
+    held = property(lambda self: ["apple", ""])  # pyright: ignore
+
+
+@pytest.mark.parametrize(
+    ("fraction", "stands", "turned"), [(0.1, True, True), (0.7, False, True), (0.7, True, False), (None, False, False)]
+)
+def test_a_bag_that_is_not_wide_open_or_lies_is_turned_over_before_it_is_filled(monkeypatch, fraction, stands, turned):
+    flap = None if fraction is None else types.SimpleNamespace(joint=types.SimpleNamespace(fraction=fraction))
+    world, done = _World(), []
+
+    def note(what):
+        done.append(what)
+        yield from ()
+        return Outcome()
+
+    monkeypatch.setattr(turning_open, "falling_flap", lambda world, name: flap)
+    monkeypatch.setattr(turning_open, "_stood", lambda world, name: "stands" if stands else None)
+    monkeypatch.setattr(turning_open, "_opened", lambda world, name: note(name))
+    monkeypatch.setattr(turning_open, "with_free_hand", lambda world, action: action)
+    filled = turning_open.into(lambda world, step: note("filled"))
+    assert list(filled(world, Step("place_inside", ("apple", BAG)))) == []
+    assert done == [BAG, "filled"][not turned :]
 
 
 def upright(simulation):

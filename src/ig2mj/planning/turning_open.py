@@ -21,12 +21,12 @@ from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.clearance import straight
 from ig2mj.planning.driving import shift
-from ig2mj.planning.grasping import grasp, is_graspable
+from ig2mj.planning.grasping import grasp, is_graspable, with_free_hand
 from ig2mj.planning.grasps import GraspPose
 from ig2mj.planning.joints import OPEN_TO, OpenableJoint
 from ig2mj.planning.moves import LET_GO, OPENS, RETREAT, TOUCHES, UP, Primitive, Program, ahead, vector3
 from ig2mj.planning.occupancy import RESOLUTION
-from ig2mj.planning.opening import joints_of, set_open, withdraw
+from ig2mj.planning.opening import WIDE, joints_of, set_open, withdraw
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.placing import place
 from ig2mj.planning.steps import Step
@@ -85,6 +85,32 @@ def opens(world: PlannedWorld, step: Step) -> Primitive:
     return (yield from set_open(True)(world, step))
 
 
+def into(inner: Callable[[PlannedWorld, Step], Primitive]) -> Callable[[PlannedWorld, Step], Primitive]:
+    """A primitive that puts something into a container: one that opens when it is turned over, and has fallen over or
+    is not wide open, is turned over before that."""
+
+    def into(world: PlannedWorld, step: Step) -> Primitive:
+        where = step.arguments[1]
+        flap = falling_flap(world, where) if world.body.opening is None and where not in world.held else None
+        if flap is not None and (flap.joint.fraction < WIDE or _stood(world, where) is None):
+            yield from with_free_hand(world, _opened(world, where))
+        return (yield from inner(world, step))
+
+    return into
+
+
+def _opened(world: PlannedWorld, name: str) -> Generator[Program, str, bool]:
+    yield from turned_open(world, name)
+    return world.facts.holds("open", name)
+
+
+def _stood(world: PlannedWorld, name: str) -> tuple[Vector, Rotation] | None:
+    """Position and orientation of an object that stands; None: it does not."""
+    pos, quat = world.pose(name)
+    frame = matrices_on_host(quat[None])[0]
+    return (pos, frame) if frame[2, 2] > STOOD else None
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Flap:
     """A flap that falls open when its container is turned over.
@@ -129,9 +155,7 @@ def turned_open(world: PlannedWorld, name: str) -> Generator[Program, str, None]
     if flap is None or (name not in world.held and all(world.held)):
         return
     if name not in world.held:
-        pos, quat = world.pose(name)
-        stood = matrices_on_host(quat[None])[0]
-        home = (pos, stood) if stood[2, 2] > STOOD else None
+        home = _stood(world, name)
         by_side = functools.partial(_is_by_side, world, name, flap.joint.axis)
         if not (yield from grasp(world, Step("grasp", (name,)), by_side)).done:
             return
