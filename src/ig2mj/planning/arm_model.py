@@ -41,6 +41,9 @@ postures, 99 % from 24, which take 1.7 ms in place of 1.2."""
 OFF, TURNED_OFF = 0.015, 0.12
 """m and rad from a pose within which a posture counts for it."""
 
+HANDS = 64
+"""Postures for whose multiples it is compiled where the hand is in each."""
+
 POINTS, STEPS = 8, 160
 """Points of a way, and agent steps, for which following it is compiled; longer ways are followed in parts."""
 
@@ -77,6 +80,7 @@ class ArmModel:
         self._ease, self._speed, self._shares, self._posture = ease, speed, shares, posture
         self.step: Callable[..., Any] = jax.jit(self._step)
         self._follow = jax.jit(self._follow_steps)
+        self._hands: Callable[..., Any] = jax.jit(self._hand)
         on_host = jax.default_backend() == "cpu"
         self._solve = jax.jit(self._solve_seeds, compiler_options=UNFUSED if on_host else None)
 
@@ -93,8 +97,10 @@ class ArmModel:
 
     def hand(self, q: Float[np.ndarray, "N J"]) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 4"]]:
         """Grasp point and orientation of the hand, in the base's frame."""
-        pos, quat = self._hand(jnp.asarray(q, jnp.float32))
-        return np.asarray(pos, float), np.asarray(quat, float)
+        count, q = len(q), np.asarray(q, np.float32)
+        padded = np.concatenate([q, np.tile(q[-1:], (-count % HANDS, 1))])
+        pos, quat = self._hands(jnp.asarray(padded))
+        return np.asarray(pos, float)[:count], np.asarray(quat, float)[:count]
 
     def _hand(self, q: Array) -> tuple[Array, Array]:
         tip, quat, _ = forward(self.chain, q)
