@@ -67,6 +67,22 @@ def test_a_bag_that_is_not_wide_open_or_lies_is_turned_over_before_it_is_filled(
     assert done == [BAG, "filled"][not turned :]
 
 
+@pytest.mark.parametrize(("at", "held", "full"), [(0.5, "", True), (0.5, "can", False), (1.5, "", False)])
+def test_a_bag_about_a_loose_thing_is_not_empty_whatever_counts_as_inside(at, held, full):
+    """What lies in a bag that has fallen over would be thrown out of it."""
+
+    class Around(_World):
+        held = property(lambda self: [hand, ""])  # pyright: ignore
+        facts = property(lambda self: types.SimpleNamespace(box=lambda name: (np.zeros(3), np.ones(3))))  # pyright: ignore
+
+        def com(self, name):
+            return np.full(3, {"can": at, BAG: 0.5}[name])
+
+    hand, world = held, Around()
+    world.domain = types.SimpleNamespace(loose=("can", BAG))  # pyright: ignore
+    assert turning_open._has_content(world, BAG) == full
+
+
 def upright(simulation):
     quat = simulation.object_pose(BAG)[1]
     return float(matrices_on_host(np.asarray(quat, float)[None])[0][2, 2])

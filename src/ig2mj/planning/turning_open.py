@@ -130,7 +130,7 @@ def falling_flap(world: PlannedWorld, name: str) -> Flap | None:
     if world.domain.fixed(name) or world.domain.hands_for(name) > 1 or not is_graspable(world, name):
         return None
     joints = [j for j in joints_of(world, name) if j.hinge]
-    if len(joints) != 1 or world.facts.things_in(name):
+    if len(joints) != 1 or _has_content(world, name):
         return None
     joint, model = joints[0], world.stage.scene.model
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, joint.name)
@@ -146,6 +146,14 @@ def falling_flap(world: PlannedWorld, name: str) -> Flap | None:
     shut = np.arctan2(arm @ UP, arm @ np.cross(UP, axis))
     to = min(np.pi / 2, shut + OPEN_TO * abs(joint.open - joint.closed)) - ONWARD
     return Flap(joint, float(1.5 * np.pi - to - np.arcsin(friction / torque)))
+
+
+def _has_content(world: PlannedWorld, name: str) -> bool:
+    """Whether something loose is in the box about a container: what lies in one that has fallen over may not count as
+    inside."""
+    low, high = world.facts.box(name)
+    others = (other for other in world.domain.loose if other not in (name, *world.held))
+    return any((low <= (at := world.com(other))).all() and (at <= high).all() for other in others)
 
 
 def turned_open(world: PlannedWorld, name: str) -> Generator[Program, str, None]:
