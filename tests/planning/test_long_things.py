@@ -8,8 +8,8 @@ import pytest
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning import driving
 from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.free_floor import FreeFloor
 from ig2mj.planning.long_things import LOWEST, stood_up
-from ig2mj.planning.phases import Phase
 from ig2mj.planning.world import HIGHEST, PlannedWorld, Stance
 
 CARRIED = np.array([0.6, 0.2, 0.8])
@@ -92,10 +92,18 @@ def test_what_is_short_or_has_no_room_upright_stays_as_it_is(world):
 def test_a_base_without_a_way_with_a_rod_turns_it_upright_and_looks_again(monkeypatch):
     """Its floor has a way once the rod stands."""
     world, lies = _World(_Room(0.7)), [True]
-    floor = types.SimpleNamespace(
-        way=lambda start, goal: None if lies[0] else np.array([[0.0, 0.0], [2.0, 0.0]]),
-        nearest=lambda xy, within: np.zeros(2, int),
-    )
+
+    class Floor(FreeFloor):
+        def __init__(self):
+            pass
+
+        def way(self, start, goal):
+            return None if lies[0] else np.array([[0.0, 0.0], [2.0, 0.0]])
+
+        def nearest(self, xy, within):
+            return np.zeros(2, int)
+
+    floor = Floor()
     world.floor = lambda **kwargs: floor  # pyright: ignore[reportAttributeAccessIssue]
     world.body.tucked, world.body.sideways, world.crosses = None, True, False
     monkeypatch.setattr(type(world), "base", property(lambda self: (np.zeros(2), 0.0)), raising=False)
@@ -110,4 +118,4 @@ def test_a_base_without_a_way_with_a_rod_turns_it_upright_and_looks_again(monkey
             lies[0] = lies[0] and not any(phase.quat is not None for phase in program)
             program = running.send("")
     assert ended.value.value == ""
-    assert [isinstance(p[0], Phase) and p[0].hand for p in programs] == [0, -1]
+    assert [p[0].hand for p in programs] == [0, -1]

@@ -9,7 +9,6 @@ import ig2mj
 from ig2mj.agents.humanoid import Humanoid
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning import turning_open
-from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.turning_open import PARTS, turns
 from ig2mj.planning.world import PlannedWorld
 
@@ -44,27 +43,6 @@ class _World(PlannedWorld):
         self.body = types.SimpleNamespace(opening=None)
 
     held = property(lambda self: ["apple", ""])  # pyright: ignore
-
-
-@pytest.mark.parametrize(
-    ("fraction", "stands", "turned"), [(0.1, True, True), (0.7, False, True), (0.7, True, False), (None, False, False)]
-)
-def test_a_bag_that_is_not_wide_open_or_lies_is_turned_over_before_it_is_filled(monkeypatch, fraction, stands, turned):
-    flap = None if fraction is None else types.SimpleNamespace(joint=types.SimpleNamespace(fraction=fraction))
-    world, done = _World(), []
-
-    def note(what):
-        done.append(what)
-        yield from ()
-        return Outcome()
-
-    monkeypatch.setattr(turning_open, "falling_flap", lambda world, name: flap)
-    monkeypatch.setattr(turning_open, "_stood", lambda world, name: "stands" if stands else None)
-    monkeypatch.setattr(turning_open, "_opened", lambda world, name: note(name))
-    monkeypatch.setattr(turning_open, "with_free_hand", lambda world, action: action)
-    filled = turning_open.into(lambda world, step: note("filled"))
-    assert list(filled(world, Step("place_inside", ("apple", BAG)))) == []
-    assert done == [BAG, "filled"][not turned :]
 
 
 @pytest.mark.parametrize(("at", "held", "full"), [(0.5, "", True), (0.5, "can", False), (1.5, "", False)])

@@ -27,7 +27,7 @@ from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
 from ig2mj.planning.treatments import cook, freeze, slice_, soak
-from ig2mj.planning.turning_open import into, opens
+from ig2mj.planning.turning_open import opens
 from ig2mj.planning.world import AWAY, PlannedWorld
 
 
@@ -88,7 +88,7 @@ ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {
     "grasp": grasp,
     "release": release,
     "place_on_top": place("on_top"),
-    "place_inside": into(place("inside")),
+    "place_inside": place("inside"),
     "place_next_to": place("next_to"),
     "place_under": place("under"),
     "place_on_floor": place("on_floor"),

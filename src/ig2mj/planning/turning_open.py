@@ -21,12 +21,12 @@ from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.clearance import straight
 from ig2mj.planning.driving import shift
-from ig2mj.planning.grasping import grasp, is_graspable, with_free_hand
+from ig2mj.planning.grasping import grasp, is_graspable
 from ig2mj.planning.grasps import GraspPose
 from ig2mj.planning.joints import OPEN_TO, OpenableJoint
 from ig2mj.planning.moves import LET_GO, OPENS, RETREAT, TOUCHES, UP, Primitive, Program, ahead, vector3
 from ig2mj.planning.occupancy import RESOLUTION
-from ig2mj.planning.opening import WIDE, joints_of, set_open, withdraw
+from ig2mj.planning.opening import joints_of, set_open, withdraw
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.placing import place
 from ig2mj.planning.steps import Step
@@ -83,25 +83,6 @@ def opens(world: PlannedWorld, step: Step) -> Primitive:
             break
         yield from turned_open(world, name)
     return (yield from set_open(True)(world, step))
-
-
-def into(inner: Callable[[PlannedWorld, Step], Primitive]) -> Callable[[PlannedWorld, Step], Primitive]:
-    """A primitive that puts something into a container: one that opens when it is turned over, and has fallen over or
-    is not wide open, is turned over before that."""
-
-    def into(world: PlannedWorld, step: Step) -> Primitive:
-        where = step.arguments[1]
-        flap = falling_flap(world, where) if world.body.opening is None and where not in world.held else None
-        if flap is not None and (flap.joint.fraction < WIDE or _stood(world, where) is None):
-            yield from with_free_hand(world, _opened(world, where))
-        return (yield from inner(world, step))
-
-    return into
-
-
-def _opened(world: PlannedWorld, name: str) -> Generator[Program, str, bool]:
-    yield from turned_open(world, name)
-    return world.facts.holds("open", name)
 
 
 def _stood(world: PlannedWorld, name: str) -> tuple[Vector, Rotation] | None:
