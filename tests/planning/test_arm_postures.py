@@ -5,11 +5,14 @@ import pytest
 
 import ig2mj
 from ig2mj.agents import Fetch
+from ig2mj.agents.grasping.grasp import MAX_DISTANCE
 from ig2mj.agents.task_robot import TaskRobot
+from ig2mj.planning.arm_model import FASTEST
 from ig2mj.planning.arms import PART, ArmBody, in_parts
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
-from ig2mj.planning.phases import Phase
+from ig2mj.planning.phases import Phase, Programs
+from ig2mj.planning.senses import Senses
 
 
 @pytest.fixture(scope="module")
@@ -89,3 +92,27 @@ def test_what_a_hand_carries_goes_in_parts(body):
     assert all(p.after == "" and p.keeps == 3 for p in parts[1:-1])
     assert len(body.prepared([Phase(hand=0, pos=p) for p in ends])) == len(ends)
     assert np.allclose(in_parts(np.zeros(3), [np.array([0.2, 0.0, 0.0])])[0], (0.1, 0.0, 0.0))
+
+
+def asked(body: ArmBody, still: int, keeps: int) -> float:
+    """m that a hand 0.4 m above its goal is asked to move in an agent step, after some in which it has not moved."""
+    quat = np.array([[1.0, 0.0, 0.0, 0.0]])
+    here = np.array([[0.6, 0.0, 1.0]])
+    at = Senses(
+        np.zeros((1, 3)),
+        quat,
+        here[None] - body.grips[:1],
+        quat[None],
+        np.ones((1, 1, 1), bool),
+        np.zeros((1, 1), bool),
+    )
+    rows = Programs.pack([[Phase(hand=0, pos=(0.6, 0.0, 0.6), keeps=keeps)]]).at(np.zeros(1, int))
+    _, move, _ = body._hand_step(at, {**rows, "still": np.array([still])})
+    return float(np.linalg.norm(move))
+
+
+def test_a_laden_hand_that_is_blocked_is_asked_for_less_than_would_cost_it_what_it_holds(body):
+    """Servos add up what is asked of a blocked hand."""
+    assert asked(body, 0, keeps=0) == asked(body, 1, keeps=0) == pytest.approx(FASTEST)
+    assert sum(asked(body, still, keeps=0) for still in range(1, 60)) < MAX_DISTANCE
+    assert sum(asked(body, still, keeps=-1) for still in range(1, 6)) > MAX_DISTANCE, "an empty one loses nothing"

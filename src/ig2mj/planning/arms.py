@@ -55,6 +55,10 @@ STRAYS = 0.02
 POSTURES = 8
 """In which the links of an arm are looked at that has its hand at a pose, at most."""
 
+YIELDS = 0.5
+"""Share of its speed that is asked of a laden hand for each agent step but one in which it has not moved: servos add up
+what is asked of a blocked hand, and lose what it holds when it is 10 cm behind."""
+
 ASIDE = 0.6
 """m that a base would like to be from what its arm does; less than the arm's reach by half."""
 
@@ -153,10 +157,14 @@ class ArmBody(WheeledBody):
         turn = np.asarray(quat_rotate_inverse(base, turn))
         move = PULL * np.where((mine & (rows["moves"] > 0))[:, None], move, 0.0)
         turn = PULL * np.where((mine & (rows["turns"] > 0))[:, None], turn, 0.0)
-        move *= np.minimum(1.0, np.minimum(rows["speed"], FASTEST) / np.maximum(np.asarray(length(move)), 1e-6))[
-            :, None
-        ]
-        turn *= np.minimum(1.0, TURN_FASTEST / np.maximum(np.asarray(length(turn)), 1e-6))[:, None]
+        share = np.ones(len(mine))
+        if "still" in rows:
+            share = np.where(rows["keeps"] >= 0, YIELDS ** np.maximum(rows["still"] - 1, 0), 1.0)
+        fastest = share * np.minimum(rows["speed"], FASTEST), share * TURN_FASTEST
+        move, turn = (
+            v * np.minimum(1.0, most / np.maximum(np.asarray(length(v)), 1e-6))[:, None]
+            for v, most in zip((move, turn), fastest, strict=True)
+        )
         return mine, move, turn
 
     def turned(self, hand: int, fingers: Direction, palm: Direction) -> tuple[float, float, float, float]:

@@ -83,7 +83,8 @@ UPRIGHT = 0.5
 Direction = Sequence[float] | np.ndarray
 
 Rows = Mapping[str, np.ndarray]
-"""The present phases, from `Programs.at`."""
+"""The present phases, from `Programs.at`; of programs that are carried out also `still`: agent steps of the phase in
+which the acting hand has not moved."""
 
 
 @runtime_checkable

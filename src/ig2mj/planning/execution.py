@@ -127,13 +127,13 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     status = np.where(running & (failed > 0), failed, np.where(finished, DONE, carry.status))
     rows = carry.programs.at(phase) if forward.any() else rows
     rise = np.where(np.isnan(rows["rise"]), carry.rise, rows["rise"])
-    steps, still, stood = (np.where(forward, 0, count) for count in (carry.steps + 1, still, stood))
+    steps, waits, stood = (np.where(forward, 0, count) for count in (carry.steps + 1, still, stood))
     hands = senses.hand_pos, senses.hand_quat
-    new = Carry(carry.programs, phase, steps, status.astype(np.int32), rows, rise, *hands, still, base, stood)
+    new = Carry(carry.programs, phase, steps, status.astype(np.int32), rows, rise, *hands, waits, base, stood)
     going = new.running
-    still = {**rows, "base": np.where(going, rows["base"], Base.STAY), "hand": np.where(going, rows["hand"], -1)}
-    still["rise"] = rise
-    return body.command(senses, still).astype(np.float32), new
+    asked = {**rows, "base": np.where(going, rows["base"], Base.STAY), "hand": np.where(going, rows["hand"], -1)}
+    asked["rise"], asked["still"] = rise, waits
+    return body.command(senses, asked).astype(np.float32), new
 
 
 def _ended(body: Body, senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
