@@ -63,11 +63,27 @@ class _Arm:
     def passes(self, points):
         return all(self.reaches(point) for point in points)
 
+    def arrives(self, points):
+        return self.passes(points)
+
+
+class _ShutInArm(_Arm):
+    """Has no room where its hand is at what it takes."""
+
+    def arrives(self, points):
+        return False
+
 
 def test_an_arm_has_to_reach_a_grasp_itself_not_only_the_place_before_it():
     before, grasp = np.array([0.75, 0.0, 0.0]), np.array([0.85, 0.0, 0.0])
     assert goes_on([before], before, _Arm()) and not goes_on([before], grasp, _Arm())
     assert goes_on([before], grasp, None) and not goes_on(None, before, None)
+
+
+def test_an_arm_has_to_have_room_at_a_grasp_where_there_are_others():
+    before, grasp = np.array([0.55, 0.0, 0.0]), np.array([0.65, 0.0, 0.0])
+    assert goes_on([before], grasp, _Arm()) and not goes_on([before], grasp, _ShutInArm())
+    assert goes_on([before], grasp, _ShutInArm(), strays=True)
 
 
 class _StraysArm(_Arm):

@@ -50,7 +50,8 @@ PART, PART_TOLERANCE = 0.12, 0.05
 """m between points of a way of a hand that carries something, at most, and within which it is at one of them."""
 
 STRAYS = 0.02
-"""m by which a hand may come nearer to what is around where its arm brings it than on the straight way."""
+"""m by which a hand may come nearer to what is around where its arm brings it than on the straight way, and the arm
+where the hand is at what it takes."""
 
 POSTURES = 8
 """In which the links of an arm are looked at that has its hand at a pose, at most."""
@@ -274,6 +275,11 @@ class ArmFollower:
         """See `Follower.passes`."""
         return self._followed(points, self._q) is not None
 
+    def arrives(self, points: Sequence[np.ndarray]) -> bool:
+        """See `Follower.arrives`."""
+        found = self._followed(points, self._q)
+        return found is not None and self._clear(found[-1:], STRAYS)
+
     def _followed(self, points: Sequence[np.ndarray], q: Float[np.ndarray, "J"]) -> Float[np.ndarray, "T J"] | None:
         own = self._own(np.array(points))
         return self._model.follow(q, own, np.tile(self._quat, (len(own), 1)))
@@ -289,11 +295,12 @@ class ArmFollower:
         radius = np.where(spheres[:, 3] < HELD, radius, np.maximum(radius, HELD))
         return self._obstacles.clear(np.column_stack([centres.reshape(-1, 3), np.tile(radius, len(joints))]))
 
-    def _clear(self, joints: np.ndarray) -> bool:
+    def _clear(self, joints: np.ndarray, less: float = 0.0) -> bool:
+        """Whether links have room. less: m by which they may come nearer to what is around than they should."""
         spheres = self._links.placed(joints)
         turn = np.broadcast_to(self._base, (len(spheres), 4))
         centres = np.asarray(quat_rotate(turn, spheres[:, :3]), float) + self._pos
-        return self._obstacles.clear(np.column_stack([centres, spheres[:, 3]]))
+        return self._obstacles.clear(np.column_stack([centres, np.maximum(spheres[:, 3] - less, HELD)]))
 
 
 def in_parts(start: Float[np.ndarray, "3"], points: Sequence[np.ndarray]) -> list[np.ndarray]:

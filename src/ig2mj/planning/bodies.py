@@ -138,6 +138,10 @@ class Follower(Protocol):
         """As a call, whatever is in the way: what the hand moves along is there, too."""
         ...
 
+    def arrives(self, points: Sequence[np.ndarray]) -> bool:
+        """As `passes`, with room for the arm, about, where the hand is at the last point."""
+        ...
+
 
 @runtime_checkable
 class HandedBody(Body, Protocol):

@@ -294,7 +294,7 @@ def _plan(
         follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles, stance)
         rests, standing = world.resting(hand, stance), world.standing(obstacles, stance, hand)
         way = hand_path(standing, spheres, rests, goal, back, search=search, follows=follows)
-        return goes_on(way, pose.at(0.0), follows)
+        return goes_on(way, pose.at(0.0), follows, strays=search)
 
     return first_way(candidates(), has_way, most)
 

@@ -127,9 +127,12 @@ def hand_path(
     return hand_path(obstacles, spheres, start, goal, entries, spare, search, follows, turns, strays=True)
 
 
-def goes_on(way: Sequence[Vector] | None, point: Vector, follows: Follower | None) -> bool:
-    """Whether there is a way of a hand, and an arm takes it on to a point, whatever is there."""
-    return way is not None and (follows is None or follows.passes([*way, point]))
+def goes_on(way: Sequence[Vector] | None, point: Vector, follows: Follower | None, strays: bool = False) -> bool:
+    """Whether there is a way of a hand, and an arm takes it on to a point, whatever the hand meets, and has room there;
+    `strays`: or has none."""
+    if way is None or follows is None:
+        return way is not None
+    return follows.passes([*way, point]) if strays else follows.arrives([*way, point])
 
 
 RAISED, DRAWN_BACK = (0.0, 0.08, 0.16, 0.28, 0.4), (0.0, 0.12)

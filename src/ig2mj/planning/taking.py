@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,6 +27,10 @@ from ig2mj.planning.moves import (
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.world import PlannedWorld, Vector
 
+STRAIGHT, TURNED = 0.006, 0.06
+"""m and rad within which a gripper is before a grasp, when it goes on to it: its fingers are little wider apart than
+what they close on."""
+
 SWEEPING = 0.1
 """Share of its way by which a hand closes in an agent step that sweeps something towards its palm: at once, the fingers
 would knock it away."""
@@ -45,6 +50,7 @@ def closing_on(world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: 
         after="",
         speed=COMING,
     )
+    before = dataclasses.replace(near, pos=vector3(way[-1]), tolerance=STRAIGHT, turn_tolerance=TURNED)
     if pose.sweeps:
         return [
             *travel(hand, way, quat),
@@ -55,6 +61,7 @@ def closing_on(world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: 
     return [
         *travel(hand, way, quat),
         *([near] if thin else []),
+        *([] if floats else [before]),
         Phase(hand=hand, pos=deep, quat=quat, until=Until.TOUCHED, object=index, close=False, limit=25, after="",
               speed=TOUCHING if thin else COMING),
         Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15, after="no_grasp",
@@ -68,7 +75,7 @@ def way_to(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> list[V
     follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles)
     back = entries(pose, world.base[0])
     way = hand_path(obstacles, spheres, world.grip(hand), pose.at(pose.before), back, search=True, follows=follows)
-    return way if goes_on(way, pose.at(0.0), follows) else None
+    return way if goes_on(way, pose.at(0.0), follows, strays=True) else None
 
 
 def spheres_of(world: PlannedWorld, pose: GraspPose) -> Float[np.ndarray, "S 4"]:
