@@ -7,7 +7,10 @@ import pytest
 
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.grasping import _making_room
+from ig2mj.planning.grasps import GraspPose
 from ig2mj.planning.moves import goes_on, hand_path
+from ig2mj.planning.phases import Until
+from ig2mj.planning.taking import closing_on
 from ig2mj.planning.world import AWAY, BETWEEN, BODY_SPARE, PlannedWorld
 
 TRUNK = 0.3
@@ -84,6 +87,33 @@ def test_an_arm_has_to_have_room_at_a_grasp_where_there_are_others():
     before, grasp = np.array([0.55, 0.0, 0.0]), np.array([0.65, 0.0, 0.0])
     assert goes_on([before], grasp, _Arm()) and not goes_on([before], grasp, _ShutInArm())
     assert goes_on([before], grasp, _ShutInArm(), strays=True)
+
+
+class _Plain(PlannedWorld):
+    """A world with a box of 10 cm."""
+
+    def __init__(self, opening):
+        turned = lambda *_: (1.0, 0.0, 0.0, 0.0)  # noqa: E731
+        self.body = SimpleNamespace(opening=opening, turned=turned)  # pyright: ignore[reportAttributeAccessIssue]
+
+    def index(self, name):
+        return 3
+
+    def vertices(self, name):
+        return np.array([[0.0, 0.0, 0.0], [0.1, 0.1, 0.1]])
+
+
+@pytest.mark.parametrize("opening", [0.1, None])
+def test_a_gripper_is_straight_before_a_grasp_when_it_goes_on_to_it(opening):
+    """The end of a way is reached within 2.5 cm, and fingers are 1 cm wider apart than what they close on."""
+    world = _Plain(opening)
+    pose = GraspPose(np.array([0.5, 0.0, 0.1]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, -1.0]), 0.12)
+    way = [np.array([0.3, 0.0, 0.5]), pose.at(pose.before)]
+    program = closing_on(world, "box", 0, pose, way)
+    before = next(k for k, phase in enumerate(program) if phase.until == Until.TOUCHED) - 1
+    assert program[before].pos == pytest.approx(tuple(pose.at(pose.before)))
+    straight = program[before].tolerance <= 0.01 and program[before].turn_tolerance < 0.1
+    assert straight == (opening is not None) and before == len(way) - 1 + (opening is not None)
 
 
 class _StraysArm(_Arm):
