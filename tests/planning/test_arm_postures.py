@@ -8,10 +8,10 @@ from ig2mj.agents import Fetch
 from ig2mj.agents.grasping.grasp import MAX_DISTANCE
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.planning.arm_model import FASTEST
-from ig2mj.planning.arms import PART, ArmBody, in_parts
+from ig2mj.planning.arms import BACK, PART, ArmBody, in_parts
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
-from ig2mj.planning.phases import Phase, Programs
+from ig2mj.planning.phases import Base, Phase, Programs
 from ig2mj.planning.senses import Senses
 
 
@@ -116,3 +116,19 @@ def test_a_laden_hand_that_is_blocked_is_asked_for_less_than_would_cost_it_what_
     assert asked(body, 0, keeps=0) == asked(body, 1, keeps=0) == pytest.approx(FASTEST)
     assert sum(asked(body, still, keeps=0) for still in range(1, 60)) < MAX_DISTANCE
     assert sum(asked(body, still, keeps=-1) for still in range(1, 6)) > MAX_DISTANCE, "an empty one loses nothing"
+
+
+def test_a_base_whose_arm_turns_it_comes_back(body):
+    """In phases of the hand; one that drives does as it is asked."""
+    quat = np.array([[np.cos(0.05), 0.0, 0.0, np.sin(0.05)]])  # turned by 0.1 rad to the left, and 3 cm ahead
+    hand = np.array([[[0.6, 0.0, 1.0]]])
+    at = Senses(np.array([[0.03, 0.0, 0.0]]), quat, hand, quat[None], np.zeros((1, 1, 1), bool), np.zeros((1, 1), bool))
+    names = list(body._names)
+    forward, turn = names.index("forward"), names.index("turn_left")
+    for phase, back in ((Phase(hand=0, pos=(0.6, 0.0, 0.6)), True), (Phase(), False)):
+        rows = Programs.pack([[phase]]).at(np.zeros(1, int))
+        action = body.command(at, {**rows, "stays": np.zeros((1, 3))})[0]
+        assert (action[forward] < 0.0 and action[turn] < 0.0) == back
+        assert abs(action[turn]) <= BACK and (back or action[turn] == 0.0)
+    rows = Programs.pack([[Phase(Base.TURN, yaw=1.0)]]).at(np.zeros(1, int))
+    assert body.command(at, {**rows, "stays": np.zeros((1, 3))})[0][turn] > 0.0

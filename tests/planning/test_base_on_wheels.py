@@ -10,7 +10,7 @@ from ig2mj.planning import driving, execution
 from ig2mj.planning.arm_kinds import FetchArmKind
 from ig2mj.planning.bodies import MOST, WheeledBody
 from ig2mj.planning.free_floor import FreeFloor
-from ig2mj.planning.phases import Base, Phase
+from ig2mj.planning.phases import Base, Phase, Until
 from ig2mj.planning.senses import Senses
 from ig2mj.planning.world import PlannedWorld, Stance
 
@@ -41,6 +41,17 @@ def test_a_base_that_something_has_stopped_does_not_wait_for_the_limit(body, mon
     assert reason_after(body, monkeypatch, 0.0, execution.STUCK) == ""
     assert reason_after(body, monkeypatch, 0.0, execution.STUCK + 2) == "timeout"
     assert reason_after(body, monkeypatch, 0.01, execution.STUCK + 2) == ""
+
+
+def test_where_a_base_stays_is_where_it_last_drove_to(body, monkeypatch):
+    """Until somebody else moves it far."""
+    carry = execution.begin([[Phase(Base.DRIVE, xy=(0.5, 0.0)), Phase(until=Until.WAITED, limit=50)]])
+    found = []
+    for x in (0.0, 0.3, 0.49, 0.5, 0.53, 0.56, 1.5):
+        monkeypatch.setattr(execution, "sense", lambda *_, x=x: senses(x))
+        _, carry = execution.advance(body, 0, carry, PhysicsView.__new__(PhysicsView))
+        found.append(carry.stays[0, 0])
+    assert found == pytest.approx([0.0, 0.3, 0.49, 0.49, 0.49, 0.49, 1.5])
 
 
 def test_what_a_hand_holds_is_turned_and_driven_slowly(body):

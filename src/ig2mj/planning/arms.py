@@ -35,7 +35,7 @@ from ig2mj.geometry.host_rotations import (
 from ig2mj.planning.arm_kinds import ArmKind
 from ig2mj.planning.arm_links import LinkSpheres, geom_spheres
 from ig2mj.planning.arm_model import FASTEST, PULL, TURN_FASTEST, ArmModel
-from ig2mj.planning.bodies import Direction, Rows, WheeledBody, goals_of_hand
+from ig2mj.planning.bodies import GAIN, Direction, Rows, WheeledBody, goals_of_hand
 from ig2mj.planning.clearance import HELD, Obstacles
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.planning.senses import Senses, grip_of
@@ -59,6 +59,10 @@ POSTURES = 8
 YIELDS = 0.5
 """Share of its speed that is asked of a laden hand for each agent step but one in which it has not moved: servos add up
 what is asked of a blocked hand, and lose what it holds when it is 10 cm behind."""
+
+ROLLED, ROLLED_TURN, BACK = 0.005, 0.01, 0.1
+"""m and rad from where a base stays up to which it has not rolled away, and share of its largest speeds at which it
+comes back."""
 
 ASIDE = 0.6
 """m that a base would like to be from what its arm does; less than the arm's reach by half."""
@@ -128,6 +132,10 @@ class ArmBody(WheeledBody):
         for name in ("forward", "turn_left"):
             place = self._places(name)
             action[:, place] = np.where(moves[:, None], drive[:, place], 0.0)
+        if "stays" in rows:
+            acts, back = ~moves & (rows["hand"] >= 0), self._back_to(senses, rows["stays"])
+            for name, command in zip(("forward", "turn_left"), back, strict=True):
+                action[acts, self._places(name)] = command[acts]
         mine, move, turn = self._hand_step(senses, rows)
         if self._kind.drawn:
             move += self._carried_back(senses, moves & (rows["hand"] < 0))
@@ -136,6 +144,19 @@ class ArmBody(WheeledBody):
         closed = np.where((rows["close"] < 0) | ~mine, held, rows["close"] > 0)
         action[:, self._places(self._close)] = np.where(closed, -1.0, 1.0)[:, None]
         return action
+
+    def _back_to(
+        self, senses: Senses, stays: Float[np.ndarray, "W 3"]
+    ) -> tuple[Float[np.ndarray, "W"], Float[np.ndarray, "W"]]:
+        """Commands of driving and turning that bring a base back, slowly, to where it stays: an arm that swings, or
+        presses on something, turns its base, whose wheels only keep their speed."""
+        offset, yaw = stays[:, :2] - senses.base_pos[:, :2], senses.yaw
+        ahead = offset[:, 0] * np.cos(yaw) + offset[:, 1] * np.sin(yaw)
+        left = (stays[:, 2] - yaw + np.pi) % (2 * np.pi) - np.pi
+        return (
+            np.where(np.abs(ahead) > ROLLED, np.clip(GAIN * ahead, -BACK, BACK), 0.0),
+            np.where(np.abs(left) > ROLLED_TURN, np.clip(GAIN * left, -BACK, BACK), 0.0),
+        )
 
     def _carried_back(self, senses: Senses, drives: Bool[np.ndarray, "W"]) -> Float[np.ndarray, "W 3"]:
         """m by which hands that carry something while the base drives are moved back to where they carry, sideways and

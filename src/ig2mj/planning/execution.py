@@ -35,6 +35,9 @@ STANDS, STANDS_TURNED, STUCK = 0.008, 0.03, 20
 """m and rad that a base on wheels has not moved in so many agent steps of a phase that moves it, if it is stuck: what
 has stopped it does so for the rest of the phase."""
 
+CARRIED_OFF, TURNED_OFF = 0.2, 0.5
+"""m and rad from where a base stays beyond which somebody else has moved it."""
+
 NEAR, TURNED_NEAR = 0.08, 0.2
 """m and rad from the end of a phase within which a base creeps, and does not count as stuck."""
 
@@ -48,7 +51,7 @@ class Carry:
       rows: the present phases. rise: m by which bodies are asked to be above their height.
       hand_pos, hand_quat: where hands were. still: agent steps of the present phase in which the acting one has not
         moved. base: x, y and direction, m and rad, from which bases that are to move have not gone far in so many
-        agent steps of the present phase as `stood` says.
+        agent steps of the present phase as `stood` says. stays: where bases that are to stay began to.
     """
 
     programs: Programs
@@ -62,6 +65,7 @@ class Carry:
     still: Int[np.ndarray, "W"]
     base: Float[np.ndarray, "W 3"] | None
     stood: Int[np.ndarray, "W"]
+    stays: Float[np.ndarray, "W 3"] | None = None
 
     @property
     def running(self) -> Bool[np.ndarray, "W"]:
@@ -115,6 +119,7 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
         there |= ends & (rows["moves"] > 0) & (still >= BLOCKED)
     there &= carry.steps >= np.where(rows["close"] >= 0, SETTLING, 0)
     stands, base = _base_stands(body, carry, senses, rows)
+    stays = _where_bases_stay(carry, senses, rows)
     stood = np.where(stands, carry.stood + 1, 0)
     late = (carry.steps >= rows["limit"]) | (stood >= STUCK)
     waited = late & (rows["until"] == Until.WAITED)
@@ -129,10 +134,10 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     rise = np.where(np.isnan(rows["rise"]), carry.rise, rows["rise"])
     steps, waits, stood = (np.where(forward, 0, count) for count in (carry.steps + 1, still, stood))
     hands = senses.hand_pos, senses.hand_quat
-    new = Carry(carry.programs, phase, steps, status.astype(np.int32), rows, rise, *hands, waits, base, stood)
+    new = Carry(carry.programs, phase, steps, status.astype(np.int32), rows, rise, *hands, waits, base, stood, stays)
     going = new.running
     asked = {**rows, "base": np.where(going, rows["base"], Base.STAY), "hand": np.where(going, rows["hand"], -1)}
-    asked["rise"], asked["still"] = rise, waits
+    asked["rise"], asked["still"], asked["stays"] = rise, waits, stays
     return body.command(senses, asked).astype(np.float32), new
 
 
@@ -189,6 +194,18 @@ def _base_stands(
     stands = (np.linalg.norm(moved[:, :2], axis=1) < STANDS) & (turned < STANDS_TURNED)
     stands &= _far(senses, rows)
     return stands, np.where(stands[:, None], carry.base, base)
+
+
+def _where_bases_stay(carry: Carry, senses: Senses, rows: Rows) -> Float[np.ndarray, "W 3"]:
+    """x, y and direction of bases where they were when they last moved by themselves; of those that somebody else has
+    moved far, where they are."""
+    base = np.column_stack([senses.base_pos[:, :2], senses.yaw])
+    if carry.stays is None:
+        return base
+    moved = base - carry.stays
+    turned = np.abs((moved[:, 2] + np.pi) % (2 * np.pi) - np.pi)
+    gone = (np.linalg.norm(moved[:, :2], axis=1) > CARRIED_OFF) | (turned > TURNED_OFF)
+    return np.where(((rows["base"] != Base.STAY) | gone)[:, None], base, carry.stays)
 
 
 def _far(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
