@@ -193,21 +193,23 @@ def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Progr
     if world.body.opening is not None:
         turns = [turn_about(spot.normal, angle) @ planned.rotation for angle in TURNS]
         regions = [planned, *(Region.turned(turn, held.corners) for turn in turns)]
-    ways = 0
-    for region in [planned, *(r for r in regions if r is not planned)]:
-        if not world.reaches(hand, stance, region.at(spot)):
-            continue
-        spheres = held.spheres(region.rotation)
-        if not obstacles.clear(spheres + np.array([*region.above(spot), 0.0])):
-            continue
-        follows = world.follows(hand, world.turned_hand(hand, region.rotation), obstacles)
-        back = [UP, -ahead(stance.yaw), spot.normal]
-        way = hand_path(obstacles, spheres, world.grip(hand), region.above(spot), back, follows=follows)
-        if way is not None:
-            return _press(world, tool, hand, region, spot, way)
-        ways += 1
-        if ways == FEW:
-            break
+    turns = [planned, *(r for r in regions if r is not planned)]
+    for strays in (False,) if world.body.opening is None else (False, True):  # at last where it strays into something
+        ways = 0
+        for region in turns:
+            if not world.reaches(hand, stance, region.at(spot)):
+                continue
+            spheres = held.spheres(region.rotation)
+            if not obstacles.clear(spheres + np.array([*region.above(spot), 0.0])):
+                continue
+            follows = world.follows(hand, world.turned_hand(hand, region.rotation), obstacles)
+            back, goal = [UP, -ahead(stance.yaw), spot.normal], region.above(spot)
+            way = hand_path(obstacles, spheres, world.grip(hand), goal, back, follows=follows, strays=strays)
+            if way is not None:
+                return _press(world, tool, hand, region, spot, way)
+            ways += 1
+            if ways == FEW:
+                break
     return []
 
 

@@ -415,7 +415,8 @@ class _From:
         region, spheres = self._turned(spot.normal)[turn]
         follows = world.follows(hand, world.turned_hand(hand, region.rotation), self._obstacles, self._stance)
         back = [UP, -ahead(self._stance.yaw), spot.normal]
-        return hand_path(self._obstacles, spheres, self._start, region.above(spot), back, follows=follows)
+        goal = region.above(spot)
+        return hand_path(self._obstacles, spheres, self._start, goal, back, follows=follows, strays=True)
 
 
 def one_after_another(strokes: list[Stroke]) -> list[Stroke]:

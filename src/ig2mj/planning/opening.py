@@ -351,7 +351,8 @@ def _plan(
                 count += 1
                 if count > (WAYS if floats else ARM_WAYS):
                     break
-                way = hand_path(obstacles, spheres, world.resting(hand, stance), before, back, follows=follows)
+                rests = world.resting(hand, stance)
+                way = hand_path(obstacles, spheres, rests, before, back, follows=follows, strays=True)
                 if way is None or (follows is not None and not follows.passes([*way, *(p for p, _ in places)])):
                     continue
                 passed += 1
@@ -405,7 +406,8 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
     before, back = first + ABOVE * normal, [-ahead(yaw), normal, UP]
     obstacles = world.obstacles()
     follows = world.follows(hand, quat, obstacles)
-    way = hand_path(obstacles, world.spheres(fingers, -normal), world.grip(hand), before, back, follows=follows)
+    spheres = world.spheres(fingers, -normal)
+    way = hand_path(obstacles, spheres, world.grip(hand), before, back, follows=follows, strays=True)
     if way is None:
         return None
     program = travel(hand, way, quat)
