@@ -55,6 +55,20 @@ def test_a_robot_with_one_hand_has_nothing_to_spray_with():
     assert offered["Spray with water"] == ("spray", "sofa_0", "atomizer_0", "water")
 
 
+@pytest.mark.parametrize("step, meant", [
+    (("spray", "mug_0"), "covered"), (("spray", "dishtowel_0"), "saturated"),
+    (("spray", "breakfast_table_0"), "covered"), (("pour", "mug_0"), "contains"),
+    (("pour", "coffee_table_0"), "covered"),
+])  # fmt: skip
+def test_what_gets_a_substance_says_what_is_meant(step, meant):
+    """A spray fills nothing, not even what something could be poured into."""
+    _, known = problem("(covered breakfast_table_0 water)", SPRAY)
+    name, target = step
+    arguments = (target, "atomizer_0", "water") if name == "spray" else ("atomizer_0", target, "water")
+    (condition,) = known.meant(Step(name, arguments)).also
+    assert (condition.predicate, condition.arguments) == (meant, (target, "water"))
+
+
 def test_states_are_set_and_litres_stay_the_same():
     made = rung("(and)", SPRAY)
     assert done(made, "grasp", "atomizer_0").done and done(made, "grasp", "mug_0").done

@@ -218,8 +218,8 @@ class Domain:
         if not templates or step.also:
             return step
         target = self.receiver(step)
-        predicate = "contains" if self.contains(target) else "saturated" if self.absorbs(target) else "covered"
-        template = next(t for t in templates if t[0] == predicate)
+        able = {"contains": self.contains(target), "saturated": self.absorbs(target), "covered": True}
+        template = next(t for predicate, can in able.items() for t in templates if can and t[0] == predicate)
         return dataclasses.replace(step, also=(step.condition(template),))
 
     def receiver(self, step: Step) -> str:
