@@ -12,6 +12,7 @@ import sys
 
 from benchmarks.harness.pages import between
 from benchmarks.harness.paths import ROOT
+from ig2mj.tasks.spots import home_and_place
 
 PAGE = ROOT / "README.md"
 BEGIN, END = "<!-- begin: python -m benchmarks.learning.readme_table --write -->\n", "<!-- end of the policies -->"
@@ -38,11 +39,8 @@ def table() -> str:
         robot, grasping = card["robot, grasping"].split(", ")
         if (robot, grasping) not in COLUMNS:
             raise ValueError(f"{file.name}: there is no column for {robot}, {grasping}")
-        row = (
-            f"{card['task']}, {len(card['homes of training'].split(', '))} homes"
-            if "homes of training" in card
-            else card["task"]
-        )
+        homes = {home_and_place(place)[0] for place in card.get("homes of training", "").split(", ") if place}
+        row = f"{card['task']}, {len(homes)} homes" if homes else card["task"]
         cells.setdefault(row, {})[robot, grasping] = f"{success[1]} %{_remarks(card)}"
     head = " | ".join(f"{robot}, {grasping}" for robot, grasping in COLUMNS)
     lines = [f"| task | {head} |", "|---" + "|--:" * len(COLUMNS) + "|"]

@@ -19,6 +19,7 @@ from ig2mj.envs.registry import find_task
 from ig2mj.errors import InputError, UnknownNameError
 from ig2mj.learn.policies import Policy, looks_of
 from ig2mj.learn.run_files import CHECKOUT, INSTALLED
+from ig2mj.tasks.spots import home_and_place
 from ig2mj.tasks.task import Task
 
 MOST_BYTES, MOST_BYTES_OF_ALL = 700_000, 12_000_000
@@ -202,7 +203,7 @@ def model_card(name: str, policy: Policy) -> str:
     }
     lines = [f"# {name}", "", "| | |", "|---|---|"]
     lines += [f"| {key} | {value} |" for key, value in rows.items() if value is not None]
-    number = len(card.get("homes", ()))
+    number = len({home_and_place(home)[0] for home in card.get("homes", ())})
     where = "trained and evaluated in one simulated home"
     if number:
         where = f"trained in {number} simulated homes and evaluated in the task's own"
