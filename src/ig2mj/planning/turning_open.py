@@ -107,7 +107,7 @@ class Flap:
 
 def falling_flap(world: PlannedWorld, name: str) -> Flap | None:
     """The flap of a container that falls open when that is turned over; None: it has none, or is not to be turned over,
-    as nobody lifts it with one hand, or something is in it."""
+    as it takes two hands, or something is in it."""
     if world.domain.fixed(name) or world.domain.hands_for(name) > 1 or not is_graspable(world, name):
         return None
     joints = [j for j in joints_of(world, name) if j.hinge]
