@@ -304,8 +304,7 @@ def _beside_first(world: PlannedWorld, name: str, proposed: Iterable[Stance]) ->
     if world.body.opening is not None:
         yield from proposed
         return
-    others = set(range(len(world.domain.model.tables.object_names))) - {world.index(name)}
-    own, height = world.planner.obstacles(world.view, others, world.world), world.com(name)[2]
+    own, height = world.only(world.index(name)), world.com(name)[2]
     above = list[Stance]()
     for stance in proposed:
         if float(own.distance(np.array([[*stance.xy, height]]))[0]) > world.body.trunk[0]:

@@ -210,8 +210,7 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles, room: floa
     points, fingers, palms = np.array(points), np.array(fingers), np.array(palms)
     body, which, deep = world.body, np.arange(len(points)), np.full(len(points), BELOW)
     if body.opening is not None:
-        others = set(range(len(tables.object_names))) - {index}
-        own = world.planner.obstacles(world.view, others, world.world)
+        own = world.only(index)
         which, points, fingers, palms, deep = _of_gripper(body, own, trunk, points, fingers, palms)
     else:
         which, points, swept = _under_fingers(corners, points, fingers, palms)

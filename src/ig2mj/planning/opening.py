@@ -319,8 +319,7 @@ def _plan(
     floor, obstacles = world.floor(), world.obstacles()
     passed, ways, floats = 0, _ways(world, joint, value, to), world.body.opening is None
     steps = (1.0, ARM_SWING) if not floats else (1.0,) if joint.hinge else (1.0, *SLIDES)
-    others = set(range(len(world.domain.model.tables.object_names))) - {joint.object_index}
-    own = world.planner.obstacles(world.view, others, world.world)
+    own = world.only(joint.object_index)
     for step, flat, (grips, end, pulls) in itertools.product(steps, (False,) if floats else (False, True), ways):
         fraction = min(end, joint.fraction + step) if value else max(end, joint.fraction - step)
         count, sweep = 0, joint.sweep(fraction)[:, :2]

@@ -175,8 +175,7 @@ def letting_go(
 
 def _is_caught(world: PlannedWorld, name: str, hand: int, way: Sequence[Vector]) -> bool:
     """Whether an object that a hand has let go is in the hand's way."""
-    others = set(range(len(world.domain.model.tables.object_names))) - {world.index(name)}
-    own, grip = world.planner.obstacles(world.view, others, world.world), world.grip(hand)
+    own, grip = world.only(world.index(name)), world.grip(hand)
     spheres = world.spheres(*world.hand_axes(hand)) * (1.0, 1.0, 1.0, TOUCHES)
     spheres = spheres[own.distance(spheres[:, :3] + grip) > spheres[:, 3]]
     return not all(straight(own, spheres, a, b) for a, b in itertools.pairwise([grip, *way]))

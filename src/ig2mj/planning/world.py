@@ -169,6 +169,11 @@ class PlannedWorld:
         found = self.planner.obstacles(self.view, [self.index(n) for n in (*without, *moved)], self.world)
         return found if at is None else found.about(at.xy, *self.body.trunk)
 
+    def only(self, index: int) -> Obstacles:
+        """Pieces of one object alone, by its number."""
+        others = set(range(len(self.domain.model.tables.object_names))) - {index}
+        return self.planner.obstacles(self.view, others, self.world)
+
     def standing(self, obstacles: Obstacles, stance: Stance, hand: int) -> Obstacles:
         """The same with the robot's body, if it stood there, and what hands but one would hold there."""
         here, yaw = self.base
@@ -252,8 +257,7 @@ class PlannedWorld:
                 for a, b in zip(low, high, strict=True)
             ]
             grid = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 3)
-            others = set(range(len(self.domain.model.tables.object_names))) - {self.index(name)}
-            own = self.planner.obstacles(self.view, others, self.world)
+            own = self.only(self.index(name))
             inside = grid[own.distance(grid) < LATTICE / 4]
             step = max(1, len(corners) // HELD_POINTS)
             self._points[name] = (np.concatenate([corners[::step], inside]) - pos) @ frame
