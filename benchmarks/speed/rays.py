@@ -9,7 +9,7 @@ for it.
 
 - `slots`, `poses`, `refit`, `depth`: parts of `base`: which particles are shown; that and where everything is; that
   and the boxes of what moves; images without colour.
-- `leaf_N`: triangles in a leaf of the trees of merged meshes. `cubql`, `median`: how these trees are built.
+- `leaf_N`, `bins_N`: triangles in a leaf of the trees of merged meshes; bins along an axis when they are made.
 - `block_N`: threads of a block; a tile of 64 rays is one or several of them.
 - `registers_N`: the most registers of a thread; 0: as many as the compiler chooses.
 - `size_N`: images of other sizes. `cameras_N`: the eye and N - 1 of the robot's other cameras.
@@ -37,13 +37,13 @@ from benchmarks.harness.kernel_times import profiled
 from benchmarks.harness.results import keep_row, machine
 from benchmarks.speed.batch import device
 from ig2mj.scene.scene import LOOKS
-from ig2mj.sensors import ray_caster, shading
+from ig2mj.sensors import shading, triangle_trees
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.sensors.particle_slots import fill_slots
 from ig2mj.worlds.draw import Draw
 
 VARIANTS = (
-    *("base", "slots", "poses", "refit", "depth", "leaf_1", "leaf_4", "leaf_8", "cubql", "median"),
+    *("base", "slots", "poses", "refit", "depth", "leaf_2", "leaf_7", "bins_16"),
     *("block_32", "block_128", "block_256", "size_64", "size_224", "cameras_3"),
     *("registers_0", "registers_64", "registers_80", "registers_96", "registers_128"),
 )
@@ -55,17 +55,17 @@ PARTS = ("slots", "poses", "refit")
 @contextlib.contextmanager
 def built(variant: str) -> Iterator[None]:
     """Trees of merged meshes and the kernel are built as the variant says."""
-    before = ray_caster.LEAF, ray_caster.CONSTRUCTOR, shading.REGISTERS
+    before = triangle_trees.LEAF, triangle_trees.BINS, shading.REGISTERS
     if variant.startswith("leaf_"):
-        ray_caster.LEAF = int(variant[5:])
-    if variant in ("cubql", "median"):
-        ray_caster.CONSTRUCTOR = variant
+        triangle_trees.LEAF = int(variant[5:])
+    if variant.startswith("bins_"):
+        triangle_trees.BINS = int(variant[5:])
     if variant.startswith("registers_"):
         shading.REGISTERS = int(variant[10:]) or None
     try:
         yield
     finally:
-        ray_caster.LEAF, ray_caster.CONSTRUCTOR, shading.REGISTERS = before
+        triangle_trees.LEAF, triangle_trees.BINS, shading.REGISTERS = before
 
 
 def camera_of(env: Any, variant: str, looks: str) -> BatchCamera:

@@ -3,9 +3,9 @@
 Only the function that finds what a ray hits is ours; the kernel around it is upstream's but for its light
 (`ig2mj.sensors.shading`). A ray is first tested against what never moves, in one tree that all worlds share, then, up
 to that distance, against what moves, and then against the garden, unless it begins and ends indoors
-(`ig2mj.sensors.indoors`): upstream tests all geoms in the order of one tree. Hits are the same up to rounding, but for
-surfaces in the same place: there upstream shows the geom with the larger number, and within a merged mesh either is
-shown.
+(`ig2mj.sensors.indoors`): upstream tests all geoms in the order of one tree. Trees of merged meshes are ours
+(`ig2mj.sensors.triangle_trees`). Hits are the same up to rounding, but for surfaces in the same place: there upstream
+shows the geom with the larger number, and within a merged mesh either is shown.
 """
 
 # Warp's kernels only look like Python, so that type checkers must leave them alone:
@@ -27,12 +27,11 @@ from mujoco.mjx.third_party.mujoco_warp._src import bvh, ray
 from ig2mj.sensors.merged_meshes import MESH, Tables
 from ig2mj.sensors.render_model import NEAR
 from ig2mj.sensors.shading import limit_light
+from ig2mj.sensors.triangle_rays import first_triangle
+from ig2mj.sensors.triangle_trees import trees_of
 
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)
 """Geom types, as in `mujoco.mjtGeom`."""
-
-CONSTRUCTOR, LEAF = "cubql", 2
-"""How trees of merged meshes are built; they are built once."""
 
 ELSEWHERE = (0.0, 0.0, 100.0)
 """Metres by which robots are moved while the tree of boxes is made: far from all else."""
@@ -67,28 +66,21 @@ def use_merged(
     mujoco.mj_forward(host, data)
     data.geom_xpos[robots] += ELSEWHERE
     known = {name: getattr(host, name) for name in dir(host) if name.startswith(("geom_", "flex_"))}
+    trees = trees_of([part.vertices[part.faces] for part in tables.parts])
     as_merged = types.SimpleNamespace(**{**known, "geom_dataid": tables.data_id, "ngeom": host.ngeom})
     for context in contexts:
         with wp.ScopedDevice(context.mesh_bvh_id.device):
-            meshes = [
-                wp.Mesh(
-                    points=wp.array(part.vertices, dtype=wp.vec3),
-                    indices=wp.array(part.faces.ravel(), dtype=wp.int32),
-                    bvh_constructor=CONSTRUCTOR,
-                    bvh_leaf_size=LEAF,
-                )
-                for part in tables.parts
-            ]
+            rows = [wp.array(tree, dtype=wp.vec4) for tree in trees]
             half = [np.abs(part.vertices).max(axis=0) for part in tables.parts]
-            context.mesh_registry |= {mesh.id: mesh for mesh in meshes}
+            context.mesh_registry |= {tree.ptr: tree for tree in rows}  # kept as long as their addresses
             own = context.mesh_bvh_id.numpy()[: host.nmesh]
-            ids = np.concatenate([own, np.array([mesh.id for mesh in meshes], np.uint64)])
+            ids = np.concatenate([own, np.array([tree.ptr for tree in rows], np.uint64)])
             context.mesh_bvh_id = wp.array(ids, dtype=wp.uint64)
             sizes = np.concatenate([context.mesh_bounds_size.numpy()[: host.nmesh].reshape(-1, 3), half])
             context.mesh_bounds_size = wp.array(sizes.astype(np.float32), dtype=wp.vec3)
             context.flex_geom_flexid = wp.array(tables.face_geom, dtype=int)
-            rows = np.concatenate([tables.geom_face, tables.geom_mesh, tables.part_face, robots])
-            context.flex_geom_edgeid = wp.array(rows.astype(np.int32), dtype=int)
+            numbers = np.concatenate([tables.geom_face, tables.geom_mesh, tables.part_face, robots])
+            context.flex_geom_edgeid = wp.array(numbers.astype(np.int32), dtype=int)
             context.geom_ray_types = tuple(sorted({*context.geom_ray_types, MESH}))
             bvh.build_scene_bvh(as_merged, data, context, nworld)
             limit_light(context, host.nlight, make_cast_ray, [*changes, _marked(pictures)])
@@ -162,17 +154,14 @@ def _cast_ray(
         face = int(-1)
         mesh_id = int(-1)
         if wp.static(still):
-            axes = wp.mat33(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-            d, n, u, v, f, merged = ray.ray_mesh_with_bvh(
-                mesh_bvh_id, wp.static(nmesh), wp.vec3(0.0, 0.0, 0.0), axes, origin, direction, dist, cull_backfaces
-            )
-            if d >= 0.0 and d < dist:
-                dist = d
-                normal = n
-                geom_id = face_geom[f]
-                bary_u = u
-                bary_v = v
-                face = f - tables[geom_id]
+            met = first_triangle(mesh_bvh_id[wp.static(nmesh)], origin, direction, dist, cull_backfaces)
+            if met[0] >= 0.0:
+                dist = met[0]
+                bary_u = met[1]
+                bary_v = met[2]
+                normal = wp.vec3(met[4], met[5], met[6])
+                geom_id = face_geom[int(met[3])]
+                face = int(met[3]) - tables[geom_id]
                 mesh_id = tables[wp.static(ngeom) + geom_id]
                 if wp.static(first_hit):
                     return geom_id, dist, normal, bary_u, bary_v, face, mesh_id
@@ -201,13 +190,24 @@ def _cast_ray(
             if wp.static(MESH in kinds):
                 if kind == wp.static(MESH):
                     which = geom_dataid[worldid % geom_dataid.shape[0], geom]
-                    d, n, u, v, f, merged = ray.ray_mesh_with_bvh(
-                        mesh_bvh_id, which, pos, mat, start, direction, reach, behind
-                    )
-                    if d >= 0.0 and merged >= wp.static(nmesh):
-                        geom = face_geom[tables[wp.static(2 * ngeom - nmesh) + merged] + f]
-                        f = f - tables[geom]
-                        merged = tables[wp.static(ngeom) + geom]
+                    if which < wp.static(nmesh):
+                        d, n, u, v, f, merged = ray.ray_mesh_with_bvh(
+                            mesh_bvh_id, which, pos, mat, start, direction, reach, behind
+                        )
+                    else:
+                        inverse = wp.transpose(mat)
+                        met = first_triangle(
+                            mesh_bvh_id[which], inverse @ (start - pos), inverse @ direction, reach, behind
+                        )
+                        d = met[0]
+                        if d >= 0.0:
+                            u = met[1]
+                            v = met[2]
+                            n = mat @ wp.vec3(met[4], met[5], met[6])
+                            f = int(met[3])
+                            geom = face_geom[tables[wp.static(2 * ngeom - nmesh) + which] + f]
+                            f = f - tables[geom]
+                            merged = tables[wp.static(ngeom) + geom]
             if wp.static(primitives):
                 if kind != wp.static(MESH):
                     size = geom_size[worldid % geom_size.shape[0], geom]
@@ -261,17 +261,14 @@ def _cast_ray(
                     if wp.min(both) > 0.0 and wp.min(far) > 0.0:
                         indoors = True
             if not indoors:
-                axes = wp.mat33(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-                d, n, u, v, f, merged = ray.ray_mesh_with_bvh(
-                    mesh_bvh_id, wp.static(last), wp.vec3(0.0, 0.0, 0.0), axes, origin, direction, dist, cull_backfaces
-                )
-                if d >= 0.0 and d < dist:
-                    dist = d
-                    normal = n
-                    geom_id = face_geom[wp.static(last_face) + f]
-                    bary_u = u
-                    bary_v = v
-                    face = f - tables[geom_id]
+                met = first_triangle(mesh_bvh_id[wp.static(last)], origin, direction, dist, cull_backfaces)
+                if met[0] >= 0.0:
+                    dist = met[0]
+                    bary_u = met[1]
+                    bary_v = met[2]
+                    normal = wp.vec3(met[4], met[5], met[6])
+                    geom_id = face_geom[wp.static(last_face) + int(met[3])]
+                    face = int(met[3]) - tables[geom_id]
                     mesh_id = tables[wp.static(ngeom) + geom_id]
         return geom_id, dist, normal, bary_u, bary_v, face, mesh_id
 
