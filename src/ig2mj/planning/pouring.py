@@ -138,15 +138,16 @@ def _turned_over(world: PlannedWorld, step: Step, hand: int, number: int) -> Gen
         if (yield motion.program(direction, tilt, goal, keeps)):
             break
         tilt = goal
-        over, said = yield from _flows(world, step, keeps)
+        over, said = yield from _flows(world, step, motion.held(direction, tilt, keeps))
         if over:
             break
     yield motion.program(direction, tilt, 0.0, keeps)
     return said
 
 
-def _flows(world: PlannedWorld, step: Step, keeps: int) -> Generator[Program, str, tuple[bool, str]]:
-    """Waits while something flows out at the present tilt; whether pouring is over, and what failed, in words."""
+def _flows(world: PlannedWorld, step: Step, held: Phase) -> Generator[Program, str, tuple[bool, str]]:
+    """Waits while something flows out, with the hand held at the present tilt for `LOOK` agent steps at a time; whether
+    pouring is over, and what failed, in words."""
     name, target, substance = step.arguments
     into, (wish, *_) = world.domain.contains(target), step.adds
 
@@ -156,7 +157,7 @@ def _flows(world: PlannedWorld, step: Step, keeps: int) -> Generator[Program, st
     before, had = litres(world.facts, name, substance), within()
     last = before
     for _ in range(LOOKS):
-        if (yield [Phase(until=Until.WAITED, keeps=keeps, limit=LOOK)]):
+        if (yield [held]):
             return True, ""
         left, has = litres(world.facts, name, substance), within()
         enough = has > FILLED * world.domain.litres(target) or not into
@@ -245,6 +246,11 @@ class _Motion:
         """The container is turned from a tilt to another."""
         count = max(1, int(np.ceil(abs(goal - tilt) / TURN)))
         return [self._phase(self.pose(direction, float(t)), keeps) for t in np.linspace(tilt, goal, count + 1)[1:]]
+
+    def held(self, direction: Vector, tilt: float, keeps: int) -> Phase:
+        """The container is kept at a tilt, where it is to be: an arm that has just turned it swings on, and turns its
+        base."""
+        return dataclasses.replace(self._phase(self.pose(direction, tilt), keeps), until=Until.WAITED, limit=LOOK)
 
     def _phase(self, pose: _Pose, keeps: int) -> Phase:
         turned = matrix_to_quat(pose.rotation @ matrices_on_host(self._quat[None])[0])
