@@ -82,12 +82,36 @@ def test_what_cannot_be_taken_out_of_the_way_is_pushed_aside(monkeypatch, graspa
     monkeypatch.setattr(clutter, "push_aside", push_aside)
     monkeypatch.setattr(clutter, "target_of", lambda *_: (0.0, 0.0, 0.0))
     monkeypatch.setattr(clutter, "_nearer", lambda *_: 1.0)
-    monkeypatch.setattr(clutter, "clutter_in_the_way", lambda *_: "rug")
+    monkeypatch.setattr(clutter, "_barring", lambda *_: ("rug", ["book"]))
     assert ended(clutter._moved(world, Step("grasp", ("cup",)), "rug"))
     assert pushes == [("rug", ["book"])] * pushed
-    monkeypatch.setattr(clutter, "clutter_in_the_way", lambda *_: None)  # it lies upon the cup
+    monkeypatch.setattr(clutter, "_barring", lambda *_: None)  # it lies upon the cup
     assert ended(clutter._moved(world, Step("grasp", ("cup",)), "rug")) == taken
     assert len(pushes) == pushed
+
+
+@pytest.mark.parametrize(
+    ("bars", "found"), [({"chair"}, "chair"), ({"stool", "chair"}, "chair"), ({"basket", "lamp"}, "lamp"), (set(), None)]
+)
+def test_what_is_in_the_way_is_what_bars_it_with_what_comes_before_not_what_stands_beside_it(monkeypatch, bars, found):
+    """Things along a way from x = 0 to x = 2 but for a lamp, which is far from it; `bars`: those that bar it together."""
+    at = {"basket": 0.5, "stool": 1.0, "chair": 1.5, "lamp": 1.0, "picture": 0.1}
+    boxes = {n: np.array([[x, 3.0 * (n == "lamp"), 2.0 * (n == "picture")]] * 2) + [[0.0], [0.2]] for n, x in at.items()}
+    world, names = world_in("kitchen_0"), list(at)
+    way = types.SimpleNamespace(way=lambda here, goal: np.array([[0.0, 0.0], [2.0, 0.0]]))
+    monkeypatch.setattr(World, "facts", property(lambda self: types.SimpleNamespace(box=boxes.__getitem__)))
+    monkeypatch.setattr(World, "floor", lambda self, without: types.SimpleNamespace(without=set(without), **vars(way)))
+    monkeypatch.setattr(World, "base", property(lambda self: (np.zeros(2), 0.0)))
+    monkeypatch.setattr(World, "index", lambda self, name: names.index(name))
+    monkeypatch.setattr(clutter, "target_of", lambda *_: (2.0, 0.0, 0.0))
+    monkeypatch.setattr(clutter, "_nearer", lambda *_: 1.0)
+    monkeypatch.setattr(clutter, "_loose", lambda *_: names)
+    stand = {names.index(n) for n in bars}
+    shut = lambda floor: bool(stand) and not stand & floor.without  # noqa: E731
+    monkeypatch.setattr(clutter, "nearest_floor", lambda world, floor, *_: None if shut(floor) else np.array([2.0, 0.0]))
+    assert clutter.clutter_in_the_way(world, Step("grasp", ("cup",))) == found
+    barring = clutter._barring(world, Step("grasp", ("cup",)))
+    assert barring is None or (found not in barring[1] and not (bars - {found}) & set(barring[1]))
 
 
 @pytest.mark.parametrize(("driven", "came"), [(0.0, False), (1.5, True)])

@@ -28,6 +28,10 @@ GAIN = 0.25
 """m by which floor has to be nearer to what a step is about than floor in reach, for things to be moved out of the way
 there."""
 
+WITH_EASE = 0.2
+"""m beyond where the base of an arm likes to be up to which its hand reaches what lies on a table with ease: farther
+away it can only point level."""
+
 PUSHING = 0.03
 """m in an agent step of a base that pushes things in its way."""
 
@@ -80,9 +84,10 @@ def _moved(world: PlannedWorld, step: Step, name: str) -> Generator[Program, str
         if world.domain.graspable(name) and (yield from bring_out(world, name)).done:
             return True
         point = target_of(world, step)
-        if point is None or name in world.held or clutter_in_the_way(world, step) != name:
+        barring = _barring(world, step)
+        if point is None or name in world.held or barring is None or barring[0] != name:
             return False  # what lies upon something is not pushed
-        others, reach = [n for n in _loose(world, step) if n != name], _nearer(world, step, point)
+        others, reach = barring[1], _nearer(world, step, point)
         opens = lambda floor: nearest_floor(world, floor, point, reach) is not None  # noqa: E731
         return (yield from push_aside(world, name, opens, others))
     except PrimitiveFailed:
@@ -95,8 +100,15 @@ def _loose(world: PlannedWorld, step: Step) -> list[str]:
 
 
 def clutter_in_the_way(world: PlannedWorld, step: Step) -> str | None:
-    """The first thing on the way to what a step is about, without loose things; None: the robot comes as near to that
-    with them as without."""
+    """The first thing that bars the way to what a step is about; None: the robot comes as near to that with all loose
+    things as without."""
+    found = _barring(world, step)
+    return None if found is None else found[0]
+
+
+def _barring(world: PlannedWorld, step: Step) -> tuple[str, list[str]] | None:
+    """The first thing on the way to what a step is about, without loose things, that bars all ways together with those
+    before it, and those behind it; None: as `clutter_in_the_way`. What just stands next to the way stays."""
     point = target_of(world, step)
     if point is None or (reach := _nearer(world, step, point)) <= 0.0:
         return None
@@ -108,15 +120,22 @@ def clutter_in_the_way(world: PlannedWorld, step: Step) -> str | None:
         return None
     lines = [(a, b, max(2, int(np.linalg.norm(b - a) / 0.05))) for a, b in itertools.pairwise(way)]
     points = np.concatenate([np.linspace(a, b, count) for a, b, count in lines])
-    met = list[tuple[int, str]]()
+    met = list[tuple[float, str]]()
     for name in loose:
         low, high = world.facts.box(name)
         if low[2] > HIGH or high[2] < LOWEST:
             continue
-        near = np.linalg.norm(points - np.clip(points, low[:2], high[:2]), axis=1) < NEAR_WAY
-        if near.any():
-            met.append((int(np.argmax(near)), name))
-    return min(met)[1] if met else None
+        apart = np.linalg.norm(points - np.clip(points, low[:2], high[:2]), axis=1)
+        near = apart < NEAR_WAY
+        met.append((float(np.argmax(near)) if near.any() else len(points) + float(apart.min()), name))
+    behind = [name for _, name in sorted(met)]
+    high = [name for name in loose if name not in behind]
+    while behind:
+        name = behind.pop(0)
+        left = world.floor(without=[world.index(n) for n in (*behind, *high)])
+        if nearest_floor(world, left, point, reach) is None:
+            return name, [*behind, *high]
+    return None
 
 
 def lying_upon(world: PlannedWorld, step: Step) -> str | None:
@@ -137,8 +156,8 @@ def _nearer(world: PlannedWorld, step: Step, point: Float[np.ndarray, "3"]) -> f
     """m from a point within which there is floor that is better than all to which the robot can drive: from where its
     hands reach the point with ease, where there is such floor without loose things."""
     floor, (here, _) = world.floor(), world.base
-    easy = world.body.reach
-    far = easy + float(np.linalg.norm(world.body.shoulders[:, :2], axis=1).max())
+    easy = world.body.reach if world.body.opening is None else world.body.away + WITH_EASE
+    far = world.body.reach + float(np.linalg.norm(world.body.shoulders[:, :2], axis=1).max())
     cells = floor.within(point[:2], far)
     cells = cells[np.isfinite(floor.distances(here, NEAR_START)[tuple(cells.T)])]
     middles, obstacles = floor.occupancy.middles(cells), world.obstacles()
