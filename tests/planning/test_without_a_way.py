@@ -91,12 +91,20 @@ def test_what_cannot_be_taken_out_of_the_way_is_pushed_aside(monkeypatch, graspa
 
 
 @pytest.mark.parametrize(
-    ("bars", "found"), [({"chair"}, "chair"), ({"stool", "chair"}, "chair"), ({"basket", "lamp"}, "lamp"), (set(), None)]
+    ("bars", "found"),
+    [({"chair"}, "chair"), ({"stool", "chair"}, "chair"), ({"basket", "lamp"}, "lamp"), (set(), None)],
 )
 def test_what_is_in_the_way_is_what_bars_it_with_what_comes_before_not_what_stands_beside_it(monkeypatch, bars, found):
-    """Things along a way from x = 0 to x = 2 but for a lamp, which is far from it; `bars`: those that bar it together."""
+    """Things along a way from x = 0 to x = 2, a lamp far from it, and a picture above it.
+
+    bars: those that bar it together.
+    """
     at = {"basket": 0.5, "stool": 1.0, "chair": 1.5, "lamp": 1.0, "picture": 0.1}
-    boxes = {n: np.array([[x, 3.0 * (n == "lamp"), 2.0 * (n == "picture")]] * 2) + [[0.0], [0.2]] for n, x in at.items()}
+    boxes = {
+        name: (np.array([x, y, z]), np.array([x, y, z + 0.2]))
+        for name, x in at.items()
+        for y, z in [(3.0 * (name == "lamp"), 2.0 * (name == "picture"))]
+    }
     world, names = world_in("kitchen_0"), list(at)
     way = types.SimpleNamespace(way=lambda here, goal: np.array([[0.0, 0.0], [2.0, 0.0]]))
     monkeypatch.setattr(World, "facts", property(lambda self: types.SimpleNamespace(box=boxes.__getitem__)))
@@ -108,7 +116,9 @@ def test_what_is_in_the_way_is_what_bars_it_with_what_comes_before_not_what_stan
     monkeypatch.setattr(clutter, "_loose", lambda *_: names)
     stand = {names.index(n) for n in bars}
     shut = lambda floor: bool(stand) and not stand & floor.without  # noqa: E731
-    monkeypatch.setattr(clutter, "nearest_floor", lambda world, floor, *_: None if shut(floor) else np.array([2.0, 0.0]))
+    monkeypatch.setattr(
+        clutter, "nearest_floor", lambda world, floor, *_: None if shut(floor) else np.array([2.0, 0.0])
+    )
     assert clutter.clutter_in_the_way(world, Step("grasp", ("cup",))) == found
     barring = clutter._barring(world, Step("grasp", ("cup",)))
     assert barring is None or (found not in barring[1] and not (bars - {found}) & set(barring[1]))
