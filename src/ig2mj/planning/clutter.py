@@ -17,6 +17,7 @@ from ig2mj.planning.grasping import with_free_hand
 from ig2mj.planning.moves import PrimitiveFailed, Program
 from ig2mj.planning.placing import bring_out
 from ig2mj.planning.pushing import push_aside
+from ig2mj.planning.spots import is_tipped
 from ig2mj.planning.stances import behind_wall
 from ig2mj.planning.steps import Step
 from ig2mj.planning.world import PlannedWorld
@@ -43,17 +44,17 @@ NEAR_WAY, HIGH = 0.3, 1.05
 
 
 def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, str, bool]:
-    """Puts the first thing that is in the way elsewhere on the floor, or pushes it aside; where that fails a base on
-    wheels pushes through. Returns whether there was one, and it was."""
+    """Puts the first thing that is in the way elsewhere on the floor, or pushes it aside, else what lies upon the
+    object; or sets up a container that has fallen over with what is to be taken. Where that fails a base on wheels
+    pushes through. Returns whether there was one, and it was moved."""
     if not isinstance(world.body, HandedBody):
         return False
-    name = clutter_in_the_way(world, step)
-    name = lying_upon(world, step) if name is None else name
-    if name is None:
-        return False
-    if (yield from with_free_hand(world, _moved(world, step, name))):
-        return True
-    return world.body.opening is not None and (yield from _pushed_through(world, step))
+    found = clutter_in_the_way(world, step), lying_upon(world, step), fallen_around(world, step)
+    names = list(dict.fromkeys(name for name in found if name is not None))
+    for name in names:
+        if (yield from with_free_hand(world, _moved(world, step, name))):
+            return True
+    return bool(names) and world.body.opening is not None and (yield from _pushed_through(world, step))
 
 
 def _pushed_through(world: PlannedWorld, step: Step) -> Generator[Program, str, bool]:
@@ -150,6 +151,14 @@ def lying_upon(world: PlannedWorld, step: Step) -> str | None:
         if over and middle < bottom[2] < high[2] + UPON and world.domain.graspable(name):
             found.append((float(top[2]), name))
     return max(found)[1] if found else None
+
+
+def fallen_around(world: PlannedWorld, step: Step) -> str | None:
+    """The container that has fallen over with an object in it that is to be taken; None: there is none."""
+    if step.primitive != "grasp":
+        return None
+    around = [n for n in world.facts.containers(step.object) if n in _loose(world, step) and is_tipped(world, n)]
+    return next((n for n in around if world.domain.graspable(n)), None)
 
 
 def _nearer(world: PlannedWorld, step: Step, point: Float[np.ndarray, "3"]) -> float:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
+from jaxtyping import Float
 
 from ig2mj.planning.bodies import Follower
 from ig2mj.planning.clearance import Obstacles, hand_way, straight
@@ -212,6 +213,9 @@ def rest(hand: int) -> Program:
 STRAYED, RAISED_OFF = 0.15, 0.1
 """m from where a hand rests, or carries what it holds, beyond which it has strayed; by which it is raised first."""
 
+SLACK = 0.001
+"""m by which what is close to other things may come closer."""
+
 TOUCHES = 0.3
 """Share of the spheres' radii that keeps clear of others where a hand with what it holds touches something."""
 
@@ -249,7 +253,7 @@ def way_home(world: PlannedWorld, hand: int, name: str, moved: Vector | None = N
 
     Args:
       name: what it holds; "": nothing. moved: by which the base has gone with the hand, m, which then comes straight up
-        or level, and what touches something where it is now does not count; None: it has not.
+        or level, and may be as close to what is around as it is now; None: it has not.
     """
     off = np.zeros(3) if moved is None else moved
     x, y = world.stance.xy + off[:2]
@@ -261,11 +265,19 @@ def way_home(world: PlannedWorld, hand: int, name: str, moved: Vector | None = N
     for share in (1.0, TOUCHES):
         there = spheres * (1.0, 1.0, 1.0, share)
         if moved is not None:
-            there = there[obstacles.distance(there[:, :3] + grip - off) > there[:, 3]]
+            there = _as_close(obstacles, there, grip - off)
         way = hand_path(obstacles, there, start, grip, back, search=obstacles.clear(there + np.array([*grip, 0.0])))
         if way is not None:
             return way[-2::-1]
     return None
+
+
+def _as_close(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], point: Vector) -> Float[np.ndarray, "n 4"]:
+    """Spheres that may come as close to what is around as they are now, with a hand at a point (m), and no closer;
+    without those whose middles are in something."""
+    room = obstacles.distance(spheres[:, :3] + point)
+    within = np.column_stack([spheres[:, :3], np.minimum(spheres[:, 3], room - SLACK)])
+    return within[within[:, 3] > 0.0]
 
 
 def from_home(
