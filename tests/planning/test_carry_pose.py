@@ -90,9 +90,10 @@ def test_an_arm_has_to_have_room_at_a_grasp_where_there_are_others():
 
 
 class _Plain(PlannedWorld):
-    """A world with a box of 10 cm."""
+    """A world with a box 10 cm wide."""
 
-    def __init__(self, opening):
+    def __init__(self, opening, height=0.1):
+        self._height = height
         turned = lambda *_: (1.0, 0.0, 0.0, 0.0)  # noqa: E731
         self.body = SimpleNamespace(opening=opening, turned=turned)  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -100,7 +101,7 @@ class _Plain(PlannedWorld):
         return 3
 
     def vertices(self, name):
-        return np.array([[0.0, 0.0, 0.0], [0.1, 0.1, 0.1]])
+        return np.array([[0.0, 0.0, 0.0], [0.1, 0.1, self._height]])
 
 
 @pytest.mark.parametrize("opening", [0.1, None])
@@ -114,6 +115,18 @@ def test_a_gripper_is_straight_before_a_grasp_when_it_goes_on_to_it(opening):
     assert program[before].pos == pytest.approx(tuple(pose.at(pose.before)))
     straight = program[before].tolerance <= 0.01 and program[before].turn_tolerance < 0.1
     assert straight == (opening is not None) and before == len(way) - 1 + (opening is not None)
+
+
+@pytest.mark.parametrize(("opening", "height", "attempt", "gently"), [
+    (None, 0.1, 0, True), (None, 0.1, 1, False), (None, 0.02, 0, False), (None, 0.02, 1, True), (0.1, 0.1, 0, False),
+])  # fmt: skip
+def test_a_floating_hand_closes_gently_and_at_once_on_what_is_thin(opening, height, attempt, gently):
+    """What is held meets no fingers: those that close at once go through the sides of a carton."""
+    pose = GraspPose(np.array([0.5, 0.0, 0.1]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, -1.0]), 0.12)
+    program = closing_on(_Plain(opening, height), "box", 0, pose, [pose.at(pose.before)], attempt)
+    (closes,) = [phase for phase in program if phase.close]
+    assert closes.until == Until.HELD and (closes.closes < 0.5) == gently
+    assert closes.closes * closes.limit > 1.5  # it closes whole
 
 
 class _StraysArm(_Arm):

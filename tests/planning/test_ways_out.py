@@ -9,7 +9,7 @@ from ig2mj.geometry.host_rotations import about_vertical
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.free_floor import POCKET, FreeFloor
 from ig2mj.planning.grasping import _off_furniture, off_others_things
-from ig2mj.planning.moves import RETREAT
+from ig2mj.planning.moves import RETREAT, SLACK, _as_close
 from ig2mj.planning.occupancy import RESOLUTION, Occupancy
 from ig2mj.planning.phases import Until
 from ig2mj.planning.placing import DEEP_DROPS, _drawn_back, _drop
@@ -167,3 +167,20 @@ def test_a_hand_that_has_closed_on_what_the_other_holds_lets_go_of_it():
 @pytest.mark.parametrize("held", [("chest_0", "chest_0"), ("plant_0", "spoon_0"), ("", ""), ("plant_0", ""), ()])
 def test_hands_keep_what_they_mean_to_hold(held):
     assert list(off_others_things(cast(PlannedWorld, _Twice(*held)))) == []
+
+
+class _Wall(Obstacles):
+    """Everything beyond x = 0."""
+
+    def __init__(self):
+        pass
+
+    def distance(self, points):
+        return -points[..., 0]
+
+
+def test_what_is_close_to_a_wall_comes_no_closer_and_what_is_in_it_does_not_count():
+    spheres = np.array([[0.0, 0.0, 0.0, 0.05], [-0.03, 0.0, 0.0, 0.05], [0.04, 0.0, 0.0, 0.05], [-0.2, 0.0, 0.0, 0.05]])
+    found = _as_close(_Wall(), spheres, np.array([-0.02, 0.0, 0.0]))
+    assert found[:, :3].tolist() == spheres[[0, 1, 3], :3].tolist()
+    assert np.allclose(found[:, 3], [0.02 - SLACK, 0.05 - SLACK, 0.05])

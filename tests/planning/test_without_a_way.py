@@ -141,3 +141,37 @@ def test_a_base_on_wheels_that_is_shut_in_pushes_through_what_it_cannot_move(mon
     assert phase.xy == (2.0, 0.0) and phase.speed == clutter.PUSHING
     at[0] = driven
     assert ended(running) == came
+
+
+def test_where_one_thing_in_the_way_cannot_be_moved_the_next_ones_are_tried(monkeypatch):
+    world, tried = world_in("kitchen_0"), []
+    world.body = object.__new__(clutter.HandedBody)  # pyright: ignore
+    world.holding[:] = [""]  # pyright: ignore
+
+    def moved(world, step, name):
+        yield []
+        tried.append(name)
+        return name == "box"
+
+    def pushed(*_):
+        yield []
+        raise AssertionError
+
+    monkeypatch.setattr(clutter, "_moved", moved)
+    monkeypatch.setattr(clutter, "_pushed_through", pushed)
+    monkeypatch.setattr(clutter, "things_in_the_way", lambda *_: ["lamp", "rug"])
+    monkeypatch.setattr(clutter, "lying_upon", lambda *_: None)
+    monkeypatch.setattr(clutter, "fallen_around", lambda *_: "box")
+    assert ended(clutter.moved_out_of_the_way(world, Step("grasp", ("cup",))))
+    assert tried == ["lamp", "rug", "box"]
+
+
+@pytest.mark.parametrize(("primitive", "tipped", "found"), [
+    ("grasp", True, "box"), ("grasp", False, None), ("open", True, None),
+])  # fmt: skip
+def test_a_container_that_fell_over_with_what_is_to_be_taken_is_set_up(monkeypatch, primitive, tipped, found):
+    world = world_in("kitchen_0")
+    world.domain.loose = ["book", "rug", "box"]  # pyright: ignore
+    monkeypatch.setattr(World, "facts", types.SimpleNamespace(containers=lambda name: ("fridge", "box")))
+    monkeypatch.setattr(clutter, "is_tipped", lambda world, name: tipped)
+    assert clutter.fallen_around(world, Step(primitive, ("cup",))) == found

@@ -128,7 +128,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
             yield [Phase(until=Until.WAITED, limit=RESTS)]
             continue
         tried.append(pose)
-        reason, detail = yield from _take(world, name, hand, pose)
+        reason, detail = yield from _take(world, name, hand, pose, attempt)
         if name in world.held:
             return Outcome(attempts=attempt + 1)
     return Outcome(reason or "no_grasp", detail, attempts=attempts)
@@ -203,23 +203,27 @@ def is_graspable(world: PlannedWorld, name: str) -> bool:
     return world.domain.graspable(name)
 
 
-def _take(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> Generator[Program, str, tuple[str, str]]:
-    """Takes an object from where the robot stands; returns why it did not, as a reason and in words."""
+def _take(
+    world: PlannedWorld, name: str, hand: int, pose: GraspPose, attempt: int = 0
+) -> Generator[Program, str, tuple[str, str]]:
+    """Takes an object from where the robot stands; returns why it did not, as a reason and in words. `attempt`: number
+    of the try."""
     index, start = world.index(name), pose.at(pose.before)
     way = yield from from_home(world, hand, functools.partial(way_to, world, name, hand, pose))
     if way is None:
         return "no_path", f"the hand has no path to {name}"
     lift = LIFT * UP * float(pose.palm @ UP > -0.9)
+    closes = True if world.body.friction or world.body.opening is not None else None
     takes = [
-        *closing_on(world, name, hand, pose, way),
+        *closing_on(world, name, hand, pose, way, attempt),
         *([Phase(hand=hand, pos=vector3(pose.at(-pose.deep)), close=True, until=Until.WAITED, limit=FIRM)]
           if world.body.friction else []),
-        *([Phase(hand=hand, pos=vector3(pose.at(0.0) + lift), keeps=index, close=True, tolerance=0.02, limit=10,
+        *([Phase(hand=hand, pos=vector3(pose.at(0.0) + lift), keeps=index, close=closes, tolerance=0.02, limit=10,
                  after="", speed=0.03)] if lift.any() else []),
     ]  # fmt: skip
     points, carries = [p + lift for p in way[-2::-1]], carry(world, hand, keeps=index, name=name, grip=pose.point)
     leaves = [
-        Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=True, tolerance=0.04, limit=30, after="",
+        Phase(hand=hand, pos=vector3(start + lift), keeps=index, close=closes, tolerance=0.04, limit=30, after="",
               speed=0.03),
         *travel(hand, points, None, keeps=index),
         *_making_room(world, name, hand),

@@ -36,11 +36,24 @@ SWEEPING = 0.1
 would knock it away."""
 
 
-def closing_on(world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: Sequence[Vector]) -> Program:
-    """The hand goes along a way to before a grasp, on until it touches the object, and closes until it holds it."""
+GENTLY = 0.2
+"""The same of a floating hand that takes hold of something. What is held meets its fingers no longer: at once, they
+would close through thin sides, and catch on them, or throw the thing, when they open."""
+
+
+def closing_on(
+    world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: Sequence[Vector], attempt: int = 0
+) -> Program:
+    """The hand goes along a way to before a grasp, on until it touches the object, and closes until it holds it.
+
+    Args:
+      attempt: number of the try. A floating hand closes at once on what is thin, and gently on other things; in odd
+        tries the other way.
+    """
     index, quat = world.index(name), world.body.turned(hand, pose.fingers, pose.palm)
     deep, floats = vector3(pose.at(-pose.deep)), world.body.opening is None
     thin = floats and float(np.ptp(world.vertices(name) @ pose.palm)) < THIN
+    gently = floats and thin == bool(attempt % 2)
     near = Phase(
         hand=hand,
         pos=vector3(pose.at(min(NEAR, pose.before))),
@@ -65,7 +78,7 @@ def closing_on(world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: 
         Phase(hand=hand, pos=deep, quat=quat, until=Until.TOUCHED, object=index, close=False, limit=25, after="",
               speed=TOUCHING if thin else COMING),
         Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15, after="no_grasp",
-              speed=CLOSING if floats else GRIPPING),
+              closes=GENTLY if gently else 1.0, speed=CLOSING if floats else GRIPPING),
     ]  # fmt: skip
 
 
