@@ -13,8 +13,9 @@ from ig2mj.errors import UnknownNameError
 from ig2mj.planning import Domain, PlanningError, SymbolicRung, TaskPlanner, make_step, solve, summary
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.pddl import domain_pddl, problem_pddl
+from ig2mj.planning.solver import _Episode
 from ig2mj.planning.step_order import ordered
-from ig2mj.planning.steps import PRIMITIVES
+from ig2mj.planning.steps import PRIMITIVES, Outcome, Step
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.predicates.host_queries import HostQueries
 from ig2mj.sampling.budget import Budget
@@ -333,6 +334,33 @@ def test_what_was_taken_for_a_condition_is_first_put_where_that_becomes_true(mod
     assert first(["book"], beside) == beside
     assert first(["book"], None) == floor
     assert first([], beside) == floor
+
+
+def test_what_something_could_not_be_put_into_is_filled_before_it_is_placed(model, monkeypatch):
+    on, into = read_conditions(["(on_top pan table)", "(inside apple pan)"])
+    domain = Domain(model, 2)
+
+    def order(failed=(), held=(), stuck=()):
+        return ordered([on, into], dict.fromkeys(failed, 1), held, lambda c: "", domain, None, stuck)
+
+    assert order() == [on, into]
+    assert order(failed=[into]) == order(failed=[into], stuck=[into]) == [into, on]
+    assert order(failed=[into], held=["pan"]) == [on, into]  # a hand holds it
+    monkeypatch.setattr(Domain, "has_lid", lambda self, name: name == "pan")
+    assert order() == [into, on]
+
+
+@pytest.mark.parametrize(("step", "serves", "counts"), [
+    (("place_on_floor", ("pan", "kitchen_0")), "(inside apple pan)", 1),
+    (("place_on_floor", ("pan", "kitchen_0")), "(on_floor pan kitchen_0)", 0),
+    (("place_inside", ("apple", "pan")), "(inside apple pan)", 0),
+])  # fmt: skip
+def test_a_container_is_not_brought_out_again_and_again(step, serves, counts):
+    (condition,) = read_conditions([serves])
+    episode = _Episode({}, 0.0)
+    for _ in range(3):
+        episode.learn(Step(*step, (), condition), Outcome())
+    assert sum(episode.failed_steps.values()) == 3 * counts and not episode.failed
 
 
 def test_a_container_that_is_carried_out_of_a_narrow_place_is_put_on_the_floor_not_released_where_it_was(

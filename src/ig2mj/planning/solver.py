@@ -51,6 +51,14 @@ class EpisodeResult:
     ended: str = ""
 
 
+def brings_out(step: Step) -> bool:
+    """Whether a step puts a container onto the floor for what is to be in it. Each time counts as a failure: where that
+    does not last, as something falls out when the container is carried back, it is left where it is."""
+    serves = step.serves
+    own = serves is not None and serves.predicate == "inside" and serves.arguments[-1] == step.arguments[0]
+    return own and step.primitive == "place_on_floor"
+
+
 Watch = Callable[[int, TaskPlan, Sequence[StepRecord]], None]
 """Called with each new plan: number of the world, the plan, the steps before it."""
 
@@ -78,6 +86,8 @@ class _Episode:
         if outcome.done:
             if step.primitive not in ("navigate_to", "release"):
                 self.stuck.clear()
+            if brings_out(step):
+                self.failed_steps[str(step)] += 1
             return
         self.failed_steps[str(step)] += 1
         if step.serves is not None:
