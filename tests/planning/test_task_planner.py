@@ -336,20 +336,6 @@ def test_what_was_taken_for_a_condition_is_first_put_where_that_becomes_true(mod
     assert first([], beside) == floor
 
 
-def test_what_something_could_not_be_put_into_is_filled_before_it_is_placed(model, monkeypatch):
-    on, into = read_conditions(["(on_top pan table)", "(inside apple pan)"])
-    domain = Domain(model, 2)
-
-    def order(failed=(), held=(), stuck=()):
-        return ordered([on, into], dict.fromkeys(failed, 1), held, lambda c: "", domain, None, stuck)
-
-    assert order() == [on, into]
-    assert order(failed=[into]) == order(failed=[into], stuck=[into]) == [into, on]
-    assert order(failed=[into], held=["pan"]) == [on, into]  # a hand holds it
-    monkeypatch.setattr(Domain, "has_lid", lambda self, name: name == "pan")
-    assert order() == [into, on]
-
-
 @pytest.mark.parametrize(("step", "serves", "counts"), [
     (("place_on_floor", ("pan", "kitchen_0")), "(inside apple pan)", 1),
     (("place_on_floor", ("pan", "kitchen_0")), "(on_floor pan kitchen_0)", 0),

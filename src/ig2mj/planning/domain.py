@@ -113,10 +113,6 @@ class Domain:
         """Whether an object has joints that count for `open`."""
         return name in self._openable
 
-    def has_lid(self, name: str) -> bool:
-        """Whether an object has just one joint that counts for `open`."""
-        return self.opens(name) and int((self.model.tables.openable_object == self.index(name)).sum()) == 1
-
     def halves(self, name: str) -> tuple[str, ...]:
         """Names of what an object is cut into."""
         names = self.model.tables.object_names

@@ -1,9 +1,7 @@
 """In which order the literals of a reading are made true: what depends on what comes first.
 
 1. what is opened for its own sake; what is cut, cleaned, soaked, cooked, filled and covered, where it stands;
-2. what is taken away, then what is placed: supports before what they bear, large things before small ones; what can be
-   carried and has a lid, such as a bag, is filled first, and placed at last, and so is any container that something
-   could not be put into;
+2. what is taken away, then what is placed: supports before what they bear, large things before small ones;
 3. what is attached;
 4. what is frozen;
 5. what is switched and shut.
@@ -48,8 +46,7 @@ def ordered(
     places = [c for c in missing if c.predicate in PLACE]
     places.sort(key=lambda c: (failed.get(c, 0), targets.index(c.arguments[-1]), -domain.volume(c.arguments[0])))
     away = [c for c in places if not c.value]
-    filled = filled_first(places, failed, domain)
-    down = supports_first([c for c in places if c.value], filled)
+    down = supports_first([c for c in places if c.value])
     attached = [c for c in missing if c.predicate == "attached"]
     frozen = [c for c in missing if c.predicate == "frozen"]
     opens = [c for c in missing if c.predicate == "open" and c.value]
@@ -64,34 +61,18 @@ def ordered(
     def goes_on(c: Condition) -> bool:
         return c == begun and (failed.get(c, 0) > 0 or (c.predicate in PLACE and any(a in held for a in c.arguments)))
 
-    def waits(c: Condition) -> bool:
-        own = c.value and c.predicate in PLACE and c.arguments[0] in filled and c.arguments[0] not in held
-        return own and any(w.predicate == "inside" and w.arguments[1] == c.arguments[0] for w in tried)
-
-    return sorted(tried, key=lambda c: (not goes_on(c), c in stuck or waits(c), failed.get(c, 0) >= LATER or waits(c)))
+    return sorted(tried, key=lambda c: (not goes_on(c), c in stuck, failed.get(c, 0) >= LATER))
 
 
-def filled_first(places: Sequence[Condition], failed: Mapping[Condition, int], domain: Domain) -> frozenset[str]:
-    """Containers that can be carried and are filled before they are placed: those with a lid, and those that something
-    could not be put into. An open bag falls over where it is moved."""
-    inside = [c for c in places if c.value and c.predicate == "inside" and not domain.fixed(c.arguments[1])]
-    return frozenset(c.arguments[1] for c in inside if failed.get(c, 0) or domain.has_lid(c.arguments[1]))
-
-
-def supports_first(places: Sequence[Condition], filled: Collection[str] = ()) -> list[Condition]:
-    """Placements, what bears before what it bears, else in the given order.
-
-    Args:
-      filled: containers that come after what is put into them.
-    """
+def supports_first(places: Sequence[Condition]) -> list[Condition]:
+    """Placements, what bears before what it bears, else in the given order."""
     import networkx  # 90 ms that importing ig2mj.Simulation does not spend
 
     graph = networkx.DiGraph()
     graph.add_nodes_from(dict.fromkeys(c.arguments[0] for c in places))
     for c in places:
         if c.arguments[-1] in graph and c.predicate != "next_to":
-            last = c.predicate == "inside" and c.arguments[1] in filled
-            graph.add_edge(*(c.arguments if last else c.arguments[::-1]))
+            graph.add_edge(c.arguments[-1], c.arguments[0])
     for c in places:  # neighbours come after their partners, where nothing says otherwise
         a, b = c.arguments
         if c.predicate == "next_to" and b in graph and not networkx.has_path(graph, a, b):
