@@ -11,7 +11,7 @@ from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
-from ig2mj.planning.cleaning_area import is_covered
+from ig2mj.planning.cleaning_area import is_behind, is_covered
 from ig2mj.planning.cleaning_strokes import (
     CLOSE,
     FEW,
@@ -58,7 +58,7 @@ TRIES = 4
 BESIDE, MOVED = 0.12, 4
 """m from dirt within which things are moved away where no tool reaches it, and how many at most."""
 
-TURNED = 2
+TURNED = 4
 """Times that a gripper turns over a tool which lies with the side up that cleans."""
 
 REGRASPS = 8
@@ -96,10 +96,9 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 hand = hand_with(world, tool)
             elif is_covered(world, tool, hand) and turned < TURNED:
                 turned += 1
-                yield from turn_over(world, tool, hand)
-                if not (yield from held_again(world, tool)):
+                if not (yield from _turned_over(world, tool, hand)):
                     return Outcome("slipped", f"{tool} was put down to be turned over", attempts=attempt + 1)
-                hand = hand_with(world, tool)
+                continue
             spots = [spot for spot in world.dirt(predicate, name) if tried[spot.number] < TRIES]
             spots.sort(key=lambda spot: tried[spot.number])
             plan = plan_strokes(world, name, tool, hand, spots, visited)
@@ -107,6 +106,11 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 plan = plan_strokes(world, name, tool, hand, spots, visited)
             while plan is None and (yield from _clear_away(world, name, tool, spots, moved)) and tool in world.held:
                 plan = plan_strokes(world, name, tool, hand, spots, ())
+            if plan is None and turned < TURNED and _is_askew(world, tool):
+                turned += 1
+                if not (yield from _turned_over(world, tool, hand_with(world, tool))):
+                    return Outcome("slipped", f"{tool} was put down to be taken from behind", attempts=attempt + 1)
+                continue
             if plan is None:
                 break
             if strayed(world, hand):
@@ -140,6 +144,19 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
         return Outcome(reason or "not_true_after", detail)
 
     return clean
+
+
+def _is_askew(world: PlannedWorld, tool: str) -> bool:
+    """Whether a gripper holds a tool, and not from behind."""
+    if world.body.opening is None or tool not in world.held:
+        return False
+    return not is_behind(world, tool, world.hand_axes(hand_with(world, tool))[1])
+
+
+def _turned_over(world: PlannedWorld, tool: str, hand: int) -> Generator[Program, str, bool]:
+    """Lets a tool fall onto its side that cleans and takes it again; returns whether it is held again."""
+    yield from turn_over(world, tool, hand)
+    return (yield from held_again(world, tool))
 
 
 def _opened(world: PlannedWorld, name: str, tool: str, opened: Tried) -> Generator[Program, str, bool]:

@@ -13,6 +13,16 @@ from ig2mj.planning.world import PlannedWorld, Vector
 COVERED = 0.5
 """Cosine of the angle between where the hand is and where the cleaning area faces, above which the hand covers it."""
 
+FLAT = 0.3
+"""Share of its width that a tool is thick at most which is flat, as a cloth is."""
+
+BEHIND = 0.6
+"""Cosine of the angle between where a gripper points and where the cleaning area faces, from which on it is behind the
+tool."""
+
+COVERED_BY_ARM = 0.2
+"""The same of a gripper on an arm, which would point back at its robot where it pressed the tool on something."""
+
 
 def cleaning_area(world: PlannedWorld, tool: str) -> tuple[Float[np.ndarray, "8 3"] | None, Vector]:
     """Corners of a tool's cleaning area, and the direction out of the tool that it faces: along its thinnest side, away
@@ -34,7 +44,24 @@ def cleaning_area(world: PlannedWorld, tool: str) -> tuple[Float[np.ndarray, "8 
 def is_covered(world: PlannedWorld, tool: str, hand: int) -> bool:
     """Whether the hand is on the side of a tool that cleans."""
     area, out = cleaning_area(world, tool)
-    return area is not None and float(world.hand_axes(hand)[1] @ out) < -COVERED
+    most = COVERED if world.body.opening is None else COVERED_BY_ARM
+    return area is not None and float(world.hand_axes(hand)[1] @ out) < -most
+
+
+def is_behind(world: PlannedWorld, tool: str, palm: Vector) -> bool:
+    """Whether a gripper that points along `palm` is behind the side of a flat tool that cleans, and so points at what
+    it cleans: one that holds the tool by its rim, more level, does not come down to a floor with it. True of other
+    tools."""
+    area, out = cleaning_area(world, tool)
+    return area is None or not is_flat(world.vertices(tool), out) or float(palm @ out) > BEHIND
+
+
+def is_flat(corners: Float[np.ndarray, "n 3"], out: Vector) -> bool:
+    """Whether an object with such corners is thin along a direction, and wide in all others."""
+    across = corners - corners.mean(0)
+    across = across - (across @ out)[:, None] * out
+    narrow = np.ptp(across @ np.linalg.svd(across, full_matrices=False)[2][1])
+    return bool(np.ptp(corners @ out) < FLAT * narrow)
 
 
 def leaves_free(world: PlannedWorld, tool: str, pose: GraspPose) -> bool:

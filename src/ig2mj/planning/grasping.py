@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from ig2mj.planning.cleaning_area import leaves_free
+from ig2mj.planning.cleaning_area import is_behind, leaves_free
 from ig2mj.planning.clearance import Obstacles, straight
 from ig2mj.planning.drawing_out import drawn_out, has_room
 from ig2mj.planning.driving import go
@@ -104,6 +104,8 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         hand = free_hand(world, attempt)
         if prefers is None and name in world.domain.tools and world.body.opening is None:
             prefers = functools.partial(_leaves_free, world, name)
+        elif prefers is None and name in world.domain.tools:
+            prefers = functools.partial(_from_behind, world, name)
         elif prefers is None and name in world.domain.sprays:
             prefers = functools.partial(_off_button, world, name)
         found = _plan(world, name, hand, tried, prefers)
@@ -177,6 +179,10 @@ def off_others_things(world: PlannedWorld) -> Generator[Program, str, None]:
 
 def _leaves_free(world: PlannedWorld, name: str, pose: GraspPose) -> float:
     return float(leaves_free(world, name, pose))
+
+
+def _from_behind(world: PlannedWorld, name: str, pose: GraspPose) -> float:
+    return float(is_behind(world, name, pose.palm))
 
 
 def _off_button(world: PlannedWorld, name: str, pose: GraspPose) -> float:
