@@ -8,7 +8,7 @@ from ig2mj.agents import Fetch
 from ig2mj.agents.grasping.grasp import MAX_DISTANCE
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.planning.arm_model import FASTEST
-from ig2mj.planning.arms import BACK, PART, ArmBody, in_parts
+from ig2mj.planning.arms import BACK, DRAWN_BACK, PART, ArmBody, in_parts
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.phases import Base, Phase, Programs
@@ -132,3 +132,16 @@ def test_a_base_whose_arm_turns_it_comes_back(body):
         assert abs(action[turn]) <= BACK and (back or action[turn] == 0.0)
     rows = Programs.pack([[Phase(Base.TURN, yaw=1.0)]]).at(np.zeros(1, int))
     assert body.command(at, {**rows, "stays": np.zeros((1, 3))})[0][turn] > 0.0
+
+
+def test_a_hand_that_carries_something_is_moved_back_to_where_it_does_by_little(body):
+    """While the base drives: what is asked of a hand that something holds adds up."""
+    held = np.ones((1, 1, 1), bool)
+    moves = []
+    for aside in (0.0, 0.003, 0.05):
+        hand = (body.carry[0] + [0.0, aside, 0.0] - body.grips[0])[None, None]
+        quat = np.array([[1.0, 0.0, 0.0, 0.0]])
+        at = Senses(np.zeros((1, 3)), quat, hand, quat[None], held, np.zeros((1, 1), bool))
+        moves.append(float(np.linalg.norm(body._carried_back(at, np.ones(1, bool))[0])))
+    assert moves[0] == pytest.approx(0.0, abs=1e-6) and 0.0 < moves[1] < moves[2] <= DRAWN_BACK + 1e-9
+    assert not body._carried_back(at, np.zeros(1, bool)).any(), "where the base stands, the hand is asked by its phase"

@@ -64,6 +64,11 @@ ROLLED, ROLLED_TURN, BACK = 0.005, 0.01, 0.1
 """m and rad from where a base stays up to which it has not rolled away, and share of its largest speeds at which it
 comes back."""
 
+DRAWN_BACK = 0.005
+"""m in an agent step by which a hand that carries something is moved back to where it does, at most: as much as inverse
+kinematics draw it away. Servos add up what is asked, so that with more what touches something on its way is lost at
+once."""
+
 ASIDE = 0.6
 """m that a base would like to be from what its arm does; less than the arm's reach by half."""
 
@@ -162,7 +167,7 @@ class ArmBody(WheeledBody):
         """m by which hands that carry something while the base drives are moved back to where they carry, sideways and
         up, base's frame: inverse kinematics draw an arm to its posture at rest, by millimetres in each agent step."""
         own = quat_rotate_inverse(senses.base_quat, grip_of(senses, 0, self.grips[0]) - senses.base_pos)
-        left = np.clip(PULL * (self.carry[0] - np.asarray(own)), -FASTEST, FASTEST) * np.array([0.0, 1.0, 1.0])
+        left = np.clip(PULL * (self.carry[0] - np.asarray(own)), -DRAWN_BACK, DRAWN_BACK) * np.array([0.0, 1.0, 1.0])
         return np.where((drives & senses.held[:, 0].any(1))[:, None], left, 0.0)
 
     @property
