@@ -47,7 +47,7 @@ class World(PlannedWorld):
         (1.2, -1, False, True),
         (0.5, -1, False, False),
         (0.0, -1, False, False),
-        (0.5, 1, True, False),
+        (0.4, 1, False, False),
         (1.2, 1, True, False),
     ],
 )

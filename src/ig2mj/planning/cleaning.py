@@ -58,8 +58,9 @@ TRIES = 4
 BESIDE, MOVED = 0.12, 4
 """m from dirt within which things are moved away where no tool reaches it, and how many at most."""
 
-TURNED = 4
-"""Times that a gripper turns over a tool which lies with the side up that cleans."""
+TURNED, RETAKEN = 2, 4
+"""Times that a gripper turns over a tool which lies with the side up that cleans, and these together with those that it
+lets it fall to take it from behind."""
 
 REGRASPS = 8
 """Times that a tool which was lost is taken again."""
@@ -98,7 +99,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 turned += 1
                 if not (yield from _turned_over(world, tool, hand)):
                     return Outcome("slipped", f"{tool} was put down to be turned over", attempts=attempt + 1)
-                continue
+                hand = hand_with(world, tool)
             spots = [spot for spot in world.dirt(predicate, name) if tried[spot.number] < TRIES]
             spots.sort(key=lambda spot: tried[spot.number])
             plan = plan_strokes(world, name, tool, hand, spots, visited)
@@ -106,7 +107,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 plan = plan_strokes(world, name, tool, hand, spots, visited)
             while plan is None and (yield from _clear_away(world, name, tool, spots, moved)) and tool in world.held:
                 plan = plan_strokes(world, name, tool, hand, spots, ())
-            if plan is None and turned < TURNED and _is_askew(world, tool):
+            if plan is None and turned < RETAKEN and _is_askew(world, tool):
                 turned += 1
                 if not (yield from _turned_over(world, tool, hand_with(world, tool))):
                     return Outcome("slipped", f"{tool} was put down to be taken from behind", attempts=attempt + 1)

@@ -20,9 +20,6 @@ BEHIND = 0.6
 """Cosine of the angle between where a gripper points and where the cleaning area faces, from which on it is behind the
 tool."""
 
-COVERED_BY_ARM = 0.2
-"""The same of a gripper on an arm, which would point back at its robot where it pressed the tool on something."""
-
 
 def cleaning_area(world: PlannedWorld, tool: str) -> tuple[Float[np.ndarray, "8 3"] | None, Vector]:
     """Corners of a tool's cleaning area, and the direction out of the tool that it faces: along its thinnest side, away
@@ -44,8 +41,7 @@ def cleaning_area(world: PlannedWorld, tool: str) -> tuple[Float[np.ndarray, "8 
 def is_covered(world: PlannedWorld, tool: str, hand: int) -> bool:
     """Whether the hand is on the side of a tool that cleans."""
     area, out = cleaning_area(world, tool)
-    most = COVERED if world.body.opening is None else COVERED_BY_ARM
-    return area is not None and float(world.hand_axes(hand)[1] @ out) < -most
+    return area is not None and float(world.hand_axes(hand)[1] @ out) < -COVERED
 
 
 def is_behind(world: PlannedWorld, tool: str, palm: Vector) -> bool:
