@@ -65,6 +65,19 @@ def test_a_hand_takes_hold_when_it_is_more_than_half_closed_and_nothing_jumps(ti
     assert not world.view.held.any()
 
 
+def test_what_a_closed_hand_lets_go_is_not_thrown(tiny_home_folder):
+    """Fingers that go on to close while contacts are dropped would be inside of it when these come back."""
+    world = over_the_can(tiny_home_folder)
+    for _ in range(4):
+        world.act(right_hand_trigger=1)
+    assert world.held == [None, "can"]
+    before = can(world)
+    world.act(right_hand_trigger=-1)
+    world.act(times=5)
+    assert world.held == [None, None]
+    assert np.linalg.norm(can(world) - before) < 5e-3
+
+
 @pytest.mark.parametrize("kilograms", [1, pytest.param(7, marks=pytest.mark.slow)])
 def test_what_is_not_too_heavy_is_carried(tmp_path, kilograms):
     world = over_the_can(home_with_can(tmp_path, kilograms))

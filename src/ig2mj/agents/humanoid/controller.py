@@ -72,12 +72,14 @@ _POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 
 @struct.dataclass
 class HumanoidState:
-    """What the controller remembers: targets in the body's frame, and the fingers of a hand that holds something.
+    """What the controller remembers: targets in the body's frame, and where fingers stand.
 
     Attributes:
       hand_pos, hand_quat, eye_pos, eye_quat: targets, m and w-x-y-z.
       trigger: 0 open, 1 closed.
-      held: hand held something at the last action. fingers: rad, where they stood when it took hold.
+      fingers: rad, where they stood at the last action at which the hand held nothing, and are kept while it holds
+        something. One action later they are inside of that: contacts with it are dropped while they close, and would
+        throw it when it is let go. known: they were read at an action.
     """
 
     hand_pos: Float[Array, "W 2 3"]
@@ -85,8 +87,8 @@ class HumanoidState:
     eye_pos: Float[Array, "W 3"]
     eye_quat: Float[Array, "W 4"]
     trigger: Float[Array, "W 2"]
-    held: Bool[Array, "W 2"]
     fingers: Float[Array, "W 2 10"]
+    known: Bool[Array, "W 2"]
 
 
 class HumanoidController:
@@ -144,8 +146,8 @@ class HumanoidController:
             eye_pos=rows(EYE_POS),
             eye_quat=rows((1.0, 0.0, 0.0, 0.0)),
             trigger=rows(np.zeros(2)),
-            held=jnp.zeros((num_worlds, 2), bool),
             fingers=rows(np.zeros((2, 10))),
+            known=jnp.zeros((num_worlds, 2), bool),
         )
 
     def control(
@@ -170,8 +172,8 @@ class HumanoidController:
 
         held = jnp.asarray(view.held)[:, self._hands].any(-1)
         now = jnp.asarray(view.agent.joint_pos)[:, self._finger_joints]
-        fingers = jnp.where((held & ~state.held)[..., None], now, state.fingers)
-        new = HumanoidState(hand_pos, hand_quat, eye_pos, eye_quat, trigger, held, fingers)
+        fingers = jnp.where((held & state.known)[..., None], state.fingers, now)
+        new = HumanoidState(hand_pos, hand_quat, eye_pos, eye_quat, trigger, fingers, jnp.ones_like(held))
 
         target_pos, target_quat = compose(body_pos[:, None], body_quat[:, None], hand_pos, hand_quat)
         hand, ahead = view.agent.hand_pos[:, self._hands], MAX_SPEED / self._gain
