@@ -10,6 +10,7 @@ from ig2mj.planning import opening
 from ig2mj.planning.joints import OPEN_TO, OpenableJoint
 from ig2mj.planning.opening import Tried, open_around, open_into
 from ig2mj.planning.spots import _shut_away
+from ig2mj.planning.steps import Step
 
 OUT = np.array([0.0, -1.0, 0.0])
 
@@ -91,3 +92,38 @@ def test_nothing_is_put_behind_drawers_that_are_pulled_out_or_into_shut_ones():
     drawers = [_drawer("top", 0.6, 0.9), _drawer("bottom", 0.4)]
     positions = np.array([[0.25, 0.45, 0.65], [0.25, -0.1, 0.65], [0.25, 0.45, 0.45], [0.25, 0.45, 0.1]])
     assert _shut_away(positions, drawers).tolist() == [True, False, True, False]
+
+
+def test_a_try_is_a_motion_after_one_that_failed_not_one_of_another_joint(moved, monkeypatch):
+    container, noted = moved
+    world = container(_drawer("top", 0.6, 0.8), _drawer("middle", 0.4, 0.7), _drawer("bottom", 0.2, 0.9))
+    world.facts.holds = lambda *_: any(j.fraction > 0.01 for j in opening.joints_of(world, "cabinet"))
+    outcome = _all(opening.set_open(False)(world, Step("close", ("cabinet",))))
+    assert outcome.done and outcome.attempts == 1 and len(noted) == 3
+
+    world = container(_drawer("top", 0.6, 0.8), _drawer("bottom", 0.2, 0.9))
+    world.facts.holds = lambda *_: any(j.fraction > 0.01 for j in opening.joints_of(world, "cabinet"))
+    fails = iter([True, False, False])
+
+    def move_joint(*arguments):
+        if next(fails):
+            yield from ()
+            return "not_true_after", "it did not move far enough"
+        return (yield from shut(*arguments))
+
+    shut = opening.move_joint
+    monkeypatch.setattr(opening, "move_joint", move_joint)
+    outcome = _all(opening.set_open(False)(world, Step("close", ("cabinet",))))
+    assert outcome.done and outcome.attempts == 2
+
+
+def test_fingers_that_push_a_door_point_to_its_hinge_and_turn_with_it():
+    door = dataclasses.replace(_door(0.5), axis=np.array([0.0, 0.0, 1.0]))
+    face, normal = np.array([0.4, -0.02, 0.5]), OUT
+    for hand in (0, 1):
+        assert np.allclose(opening._fingers(door, (face, normal), False, hand, True), [-1.0, 0.0, 0.0])
+    fingers, turned = np.array([-1.0, 0.0, 0.0]), np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
+    plan = opening._JointPlan(None, [(face, normal)], False, fingers, 0.0)  # pyright: ignore
+    world = types.SimpleNamespace(body=types.SimpleNamespace(turned=lambda hand, fingers, palm: (fingers, palm)))
+    along, palm = opening._turned(world, 0, plan, turned)  # pyright: ignore
+    assert np.allclose(palm, -turned) and abs(along @ palm) < 1e-9 and along @ fingers > 0.7

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ig2mj.cli import call
-from ig2mj.cli.common.plan_benchmark import figure_cells, primitive_figures
+from ig2mj.cli.common.plan_benchmark import _jobs, figure_cells, primitive_figures
 from ig2mj.knowledge.substances import WATER
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.requests import MEASURED, Request, RequestSource, added_to
@@ -120,10 +120,18 @@ def test_shares_are_of_requests_that_are_prepared_and_have_a_solution():
     assert primitive_figures(rows, "close") == {}
 
 
+def test_single_requests_are_asked_by_their_numbers():
+    conditions = {"rung": "symbolic", "robot": "humanoid", "seed": 0}
+    jobs = _jobs({("open", 7)}, ("open", "close"), (3, 7), conditions, 1.0)
+    asked = sorted(tuple(request) for job in jobs for request in job.arguments["requests"])
+    assert asked == [("close", 3), ("close", 7), ("open", 3)]
+
+
 @pytest.mark.parametrize(
     ("arguments", "telling"),
     [
-        (["--requests", "0"], "--requests 0: at least one"),
+        (["--requests", "0"], "--requests: at least one"),
+        (["--numbers", "-1"], "--numbers -1: requests are numbered from 0"),
         (["--primitives", "opn"], "near matches: open"),
         (["--seconds", "0"], "must be above 0"),
         (["making_tea"], "draws its own requests"),

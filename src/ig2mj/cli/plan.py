@@ -27,6 +27,7 @@ def run(
     rung: Literal["symbolic", "kinematic", "physics"] = "physics",
     requests: int = 200,
     primitives: tuple[str, ...] = (),
+    numbers: tuple[int, ...] = (),
     seed: int = 0,
     jobs: int = 1,
     seconds: float = 600.0,
@@ -51,6 +52,7 @@ def run(
       rung: what carries them out (docs/guide/planning.md).
       requests: number for each primitive.
       primitives: only these.
+      numbers: only these requests to each primitive, from 0, in place of the first --requests.
       seed: of the requests.
       jobs: processes; 0: one per processor.
       seconds: wall time of a request, after which it counts as failed.
@@ -62,7 +64,7 @@ def run(
 
         if what is not None or goal is not None or object or pddl is not None:
             raise Ig2mjError("--benchmark draws its own requests: leave out activity, home, goal, --object and --pddl")
-        return measured(rung, robot, requests, primitives, seed, jobs, seconds, out, json)
+        return measured(rung, robot, numbers or range(requests), primitives, seed, jobs, seconds, out, json)
     if what is None:
         from ig2mj.errors import Ig2mjError
 

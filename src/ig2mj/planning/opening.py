@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Mapping
 
 import numpy as np
 
+from ig2mj.geometry.host_rotations import turn_onto
 from ig2mj.planning.clearance import Obstacles, hand_way
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasps import AT_OBJECT
@@ -48,6 +49,9 @@ AWAY = 0.7
 
 PUSH_IN, PRESS = 0.03, 0.004
 """m behind a face that a hand goes for which takes hold of it, and which pushes it shut."""
+
+EASED = 0.02
+"""m that a hand goes off a face slowly which it has pressed on: a door that is let go at once springs open again."""
 
 OFF = (0.0, 0.1, 0.2)
 """m that a hand goes off a link that it has moved, before it goes back to where it rests."""
@@ -99,25 +103,27 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
 
     def set_open(world: PlannedWorld, step: Step) -> Primitive:
         name, reason, detail = step.object, "no_grasp", ""
-        passed, nowhere = dict[str, int](), 0
-        moves = 2 * ATTEMPTS if world.body.opening is None else ARM_MOVES
-        for attempt in range(moves):
+        passed, nowhere, tries, failed = dict[str, int](), 0, 1, False
+        moves = 2 * ATTEMPTS - 1 + len(joints_of(world, name)) if world.body.opening is None else ARM_MOVES
+        for _ in range(moves):
             if world.facts.holds("open", name) == value:
-                return Outcome(attempts=max(attempt, 1))
+                return Outcome(attempts=tries)
+            tries += failed  # else the next move is of another joint, or goes on where the last was to end
             joints = [j for j in joints_of(world, name) if value or j.fraction > SHUT]
             if not joints:
                 return Outcome("no_grasp", f"{name} has no joints that open")
             joint = min(joints, key=lambda j: passed.get(j.name, 0))  # of equals the first: the largest link
             tried = passed.get(joint.name, 0)
             reason, detail = yield from move_joint(world, joint, free_hand(world, tried), value, tried)
+            failed = bool(reason)
             nowhere = nowhere + 1 if reason == "no_base" else 0
             if nowhere == HANDS * len(joints):
                 break
             now = {j.name: j.fraction for j in joints_of(world, name)}
             passed[joint.name] = tried + (_progress(joint, now, value) < MOVED)
         if world.facts.holds("open", name) == value:
-            return Outcome(attempts=moves)
-        return Outcome(reason or "not_true_after", detail, attempts=moves)
+            return Outcome(attempts=tries)
+        return Outcome(reason or "not_true_after", detail, attempts=tries)
 
     return set_open
 
@@ -231,7 +237,8 @@ def _progress(joint: OpenableJoint, now: Mapping[str, float], value: bool) -> fl
 def move_joint(
     world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int = 0, to: float = OPEN_TO
 ) -> Generator[Program, str, tuple[str, str]]:
-    """Opens or closes one door, drawer or lid; returns why it did not, as a reason and in words.
+    """Opens or closes one door, drawer or lid as far as one motion of a hand does; returns why it did not come there,
+    as a reason and in words, or "" twice.
 
     Args:
       tried: ways that have failed, which are left out. to: share of its range to which it is opened.
@@ -247,6 +254,9 @@ def move_joint(
     reason = yield program
     yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=6, after="")]
     yield withdraw(world, hand)
+    now = next(j.fraction for j in joints_of(world, joint.object) if j.name == joint.name)
+    if now > found.to - MOVED if value else now < found.to + MOVED:
+        return "", ""
     return reason or "not_true_after", f"{joint.name} did not move far enough"
 
 
@@ -270,12 +280,13 @@ def withdraw(world: PlannedWorld, hand: int) -> Program:
 class _JointPlan:
     """How a hand moves a joint: from where, and for each place on the way the point and the normal of the face that it
     is at. pulls: it takes hold of the face; else it pushes it. fingers: where they point or, of a gripper, from one to
-    the other."""
+    the other. to: share of the joint's range at which the way ends."""
 
     stance: Stance
     places: list[FaceGrip]
     pulls: bool
     fingers: Vector
+    to: float
 
 
 def _ways(
@@ -329,7 +340,7 @@ def _plan(
             if flat != (pinches and pinched is None) or (flat and _is_between_rooms(world, joint)):
                 continue  # fingers find nothing between them on a flat face, as a leaf has; handles may be there
             count = 0 if floats else count
-            grip, fingers = (grip, _fingers(joint, grip, pulls, hand)) if pinched is None else pinched
+            grip, fingers = (grip, _fingers(joint, grip, pulls, hand, floats)) if pinched is None else pinched
             places = joint.path(grip, fraction)
             first, normal = places[0]
             upright = grips is not joint.edges and float(np.linalg.norm(normal[:2])) > UPRIGHT
@@ -356,7 +367,7 @@ def _plan(
                     continue
                 passed += 1
                 if passed > tried:
-                    return _JointPlan(stance, places, pulls, fingers)
+                    return _JointPlan(stance, places, pulls, fingers, fraction)
                 if pinched is None:
                     break  # the next grip; what fits between fingers is tried from other places
     return None
@@ -383,10 +394,15 @@ def _is_full(world: PlannedWorld, joint: OpenableJoint) -> bool:
     return not joint.hinge and any(joint.surrounds(world.com(n)) for n in world.domain.loose if n not in world.held)
 
 
-def _fingers(joint: OpenableJoint, grip: FaceGrip, pulls: bool, hand: int) -> Vector:
+def _fingers(joint: OpenableJoint, grip: FaceGrip, pulls: bool, hand: int, floats: bool) -> Vector:
     """Fingers that pull lie upwards, where the link is that high: else they take hold of the drawer above. Those that
-    push lie along the face, so that they do not enter the gap above a drawer."""
+    push lie along the face, so that they do not enter the gap above a drawer, and point to a hinge, away from what is
+    next to a door; those of a gripper are level."""
     point, normal = grip
+    if joint.hinge and not pulls and floats:
+        arm = point - joint.anchor
+        back = (arm @ joint.axis) * joint.axis + (arm @ normal) * normal - arm
+        return back / np.linalg.norm(back)
     pulls = pulls and (joint.hinge or float(joint.vertices[:, 2].max() - point[2]) > FINGERS)
     across = UP - (UP @ normal) * normal
     across = across / np.linalg.norm(across) if np.linalg.norm(across) > 0.3 else np.array([1.0, 0.0, 0.0])
@@ -394,6 +410,12 @@ def _fingers(joint: OpenableJoint, grip: FaceGrip, pulls: bool, hand: int) -> Ve
         return across
     level = np.cross(normal, UP) * (1.0 if hand == 0 else -1.0)
     return level / np.linalg.norm(level) if np.linalg.norm(level) > 0.5 else across
+
+
+def _turned(world: PlannedWorld, hand: int, plan: _JointPlan, normal: Vector) -> tuple[float, float, float, float]:
+    """Orientation of a hand with its palm at a face as at the first one of its way, where the normal is another."""
+    fingers = turn_onto(plan.places[0][1], normal) @ plan.fingers
+    return world.body.turned(hand, fingers, -normal)
 
 
 def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointPlan) -> Program | None:
@@ -410,13 +432,19 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
     if way is None:
         return None
     program = travel(hand, way, quat)
-    if not plan.pulls:  # an open hand pushes
+    if not plan.pulls:  # an open hand pushes; one that floats turns with the face, which its fingers would go through
+        floats = world.body.opening is None
+        turned = [_turned(world, hand, plan, n) if floats else None for _, n in places]
         program += [
-            Phase(hand=hand, pos=vector3(p - PRESS * n), close=False, tolerance=0.03, limit=12, after="", speed=0.04)
-            for p, n in places
-        ]
+            Phase(hand=hand, pos=vector3(p - PRESS * n), quat=q, close=False, tolerance=0.03, limit=12, after="",
+                  speed=0.04)
+            for (p, n), q in zip(places, turned, strict=True)
+        ]  # fmt: skip
         last = vector3(places[-1][0] - 2 * PRESS * places[-1][1])
-        program.append(Phase(hand=hand, pos=last, until=Until.WAITED, limit=6))
+        eased = Phase(hand=hand, pos=vector3(places[-1][0] + EASED * places[-1][1]), tolerance=0.008, limit=12,
+                      after="", speed=TOUCHING)  # fmt: skip
+        pressed = Phase(hand=hand, pos=last, quat=turned[-1], until=Until.WAITED, limit=6)
+        program += [pressed, eased] if floats else [pressed]
     elif not _is_held(world, joint):
         program += [
             Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), quat=quat, close=True, until=Until.WAITED,
@@ -431,8 +459,10 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
             hand=hand, pos=vector3(first + NEAR * normal), quat=quat, tolerance=0.01, limit=12, after="", speed=COMING
         )
         limit = 20 + int(np.linalg.norm(places[1][0] - first) / speed)
-        # A palm is in the face that it holds: what slides is pushed back where the palm stays there while it opens.
-        off = vector3(places[-1][0] + RETREAT * places[-1][1]) if floats and not joint.hinge else None
+        # A palm is in the face that it holds: what slides, and a door that was pulled shut, is pushed back where it
+        # stays there while it opens.
+        leaves = floats and (not joint.hinge or plan.to < joint.fraction)
+        off = vector3(places[-1][0] + RETREAT * places[-1][1]) if leaves else None
         program += [
             *([near] if floats else []),
             Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), quat=quat, until=Until.TOUCHED, object=index,

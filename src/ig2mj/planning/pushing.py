@@ -39,6 +39,9 @@ ROUNDS, STROKE = 12, 0.4
 BEHIND, PRESS = 0.12, 0.03
 """m behind a face at which a palm comes to it, and m beyond the gap that it goes for."""
 
+HALF = 0.5
+"""Share of a stroke that an object has to move by: else the next stroke is another try."""
+
 STANCES = 10
 """That are tried from each side."""
 
@@ -66,19 +69,22 @@ def push(world: PlannedWorld, step: Step) -> Primitive:
             if put.done or name in world.held:
                 return put
     reason, detail = "no_base", f"no free floor from which a hand can push {name} towards {other}"
-    failed = 0
-    for attempt in range(ROUNDS):
+    failed, tries, missed = 0, 1, False
+    for _ in range(ROUNDS):
         if world.facts.holds("in_contact_with", name, other):
-            return Outcome(attempts=attempt + 1)
-        pushed = yield from _push_once(world, name, _towards(world, name, other), failed)
+            return Outcome(attempts=tries)
+        tries += missed  # else the next stroke goes on where the last was to end
+        ways = _towards(world, name, other)
+        pushed = yield from _push_once(world, name, ways, failed)
         if pushed is None or failed >= ATTEMPTS:
             break
         reason, moved = pushed
+        missed = bool(reason) or moved < HALF * min(ways[0][1], STROKE)
         detail = f"the hand has no path to {name}" if reason == "no_path" else f"{name} does not reach {other}"
         failed += moved < PRESS
     if world.facts.holds("in_contact_with", name, other):
-        return Outcome(attempts=ROUNDS)
-    return Outcome(reason or "not_true_after", detail, attempts=ROUNDS)
+        return Outcome(attempts=tries)
+    return Outcome(reason or "not_true_after", detail, attempts=tries)
 
 
 def push_aside(

@@ -297,25 +297,33 @@ def _upright(world: PlannedWorld, name: str, flat: bool = False, every: bool = F
       flat: just those in which it is lowest. every: all of them, and also those farther from the present one.
     """
     _, now = world.pose(name)
-    frame, found = matrices_on_host(now[None])[0], []
+    frame = matrices_on_host(now[None])[0]
     own = [matrices_on_host(np.array([e.quat], float))[0][2] for e in _orientations(world, name)]
-    standing = [v for v in own if v[2] > STANDS]
+    standing, others = [v for v in own if v[2] > STANDS], list[Vector]()
     if world.domain.opens(name) and standing:
-        own = standing
+        own, others = standing, [v for v in own if v[2] <= STANDS]
     if flat and own:
         heights = np.ptp(world.vertices(name) @ frame @ np.stack(own, 1), axis=0)
         own = [vertical for vertical, height in zip(own, heights, strict=True) if height < LOWER * heights.min()]
-    for vertical in own:
-        up = frame @ vertical  # that of the orientation, now
-        axis, angle = np.cross(up, UP), float(np.arccos(np.clip(up[2], -1.0, 1.0)))
-        axis = axis / np.linalg.norm(axis) if np.linalg.norm(axis) > 1e-6 else np.array([1.0, 0.0, 0.0])
-        tilt = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])
-        found.append((angle, np.asarray(quat_multiply(tilt, now), float)))
+    found, further = ([_nearest(frame, now, v) for v in verticals] for verticals in (own, others))
     found.sort(key=lambda pair: pair[0])
     kept = [quat for angle, quat in found if angle < found[0][0] + ORIENTATION_SPREAD][:ORIENTATIONS]
     if every and world.body.opening is None:
         kept += [quat for _, quat in found if not any(quat is k for k in kept)]
+        if further:
+            kept += kept[:1] * (ORIENTATIONS - len(kept))  # the first ones are tried in any case
+            kept += [quat for _, quat in sorted(further, key=lambda pair: pair[0])]
     return kept or [now]
+
+
+def _nearest(frame: Rotation, now: Float[np.ndarray, "4"], vertical: Vector) -> tuple[float, Float[np.ndarray, "4"]]:
+    """The orientation nearest to the present one, `frame` and `now`, in which a direction of an object points up; and
+    how far it is from that, rad."""
+    up = frame @ vertical
+    axis, angle = np.cross(up, UP), float(np.arccos(np.clip(up[2], -1.0, 1.0)))
+    axis = axis / np.linalg.norm(axis) if np.linalg.norm(axis) > 1e-6 else np.array([1.0, 0.0, 0.0])
+    tilt = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])
+    return angle, np.asarray(quat_multiply(tilt, now), float)
 
 
 def _orientations(world: PlannedWorld, name: str) -> Sequence[OrientationEntry]:

@@ -23,7 +23,7 @@ COLUMNS = (
 def benchmark(
     rung: str,
     robot: str,
-    requests: int,
+    numbers: Sequence[int],
     primitives: Sequence[str],
     seed: int,
     jobs: int,
@@ -31,7 +31,11 @@ def benchmark(
     out: pathlib.Path | None,
     json: bool,
 ) -> int:
-    """See `ig2mj plan --benchmark`. Raises Ig2mjError, UnknownNameError: an argument is none."""
+    """See `ig2mj plan --benchmark`; `numbers`: of the requests to each primitive.
+
+    Raises:
+      Ig2mjError, UnknownNameError: an argument is none.
+    """
     from ig2mj.agents.registry import make_robot
     from ig2mj.cli.common.files import check_output
     from ig2mj.cli.common.jobs import follow, tell_failures
@@ -46,8 +50,10 @@ def benchmark(
     from ig2mj.process.settings import default_variables
     from ig2mj.simulation.requests import RUNGS
 
-    if requests < 1:
-        raise Ig2mjError(f"--requests {requests}: at least one is needed")
+    if not numbers:
+        raise Ig2mjError("--requests: at least one is needed")
+    if min(numbers) < 0:
+        raise Ig2mjError(f"--numbers {min(numbers)}: requests are numbered from 0")
     if not seconds > 0:
         raise Ig2mjError(f"--seconds {seconds:g}: must be above 0")
     if rung not in RUNGS:
@@ -61,11 +67,11 @@ def benchmark(
     conditions = {"rung": rung, "robot": robot, "seed": seed, "doors": "open"}
     names = tuple(primitives) or MEASURED
     rows = [row for row in _read(out) if row["conditions"] == conditions]
-    rows = [row for row in rows if row["primitive"] in names and row["number"] < requests]
-    work = _jobs({(row["primitive"], row["number"]) for row in rows}, names, requests, conditions, seconds)
+    rows = [row for row in rows if row["primitive"] in names and row["number"] in numbers]
+    work = _jobs({(row["primitive"], row["number"]) for row in rows}, names, numbers, conditions, seconds)
     if jobs != 1:
         default_variables(ONE_THREAD)
-    job_set = JobSet("ig2mj.simulation.requests:measure", f"{requests} requests to each primitive, {rung}", work)
+    job_set = JobSet("ig2mj.simulation.requests:measure", f"{len(numbers)} requests to each primitive, {rung}", work)
     made_by = {"conditions": conditions, "command": _command(), "commit": _commit(), "versions": versions()}
     failed: dict[str, str] = {}
     with follow(job_set.title) as progress:
@@ -90,7 +96,11 @@ def benchmark(
 
 
 def _jobs(
-    known: set[tuple[str, int]], names: Sequence[str], requests: int, conditions: Mapping[str, Any], seconds: float
+    known: set[tuple[str, int]],
+    names: Sequence[str],
+    numbers: Sequence[int],
+    conditions: Mapping[str, Any],
+    seconds: float,
 ) -> list[Any]:
     """Jobs for the requests that are missing, grouped by home."""
     from ig2mj.cluster.jobs import Job
@@ -98,7 +108,7 @@ def _jobs(
 
     seed = conditions["seed"]
     by_home: dict[str, list[tuple[str, int]]] = {}
-    for number in range(requests):
+    for number in numbers:
         for name in names:
             if (name, number) not in known:
                 by_home.setdefault(home_of(name, number, seed), []).append((name, number))
