@@ -8,7 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ig2mj.planning import placing
+from ig2mj.planning import grasping, placing
+from ig2mj.planning.grasps import GraspPose
+from ig2mj.planning.phases import Base
 from ig2mj.planning.placing import AROUND, STANCES, Spot
 from ig2mj.planning.world import PlannedWorld, Stance
 
@@ -84,3 +86,32 @@ def test_only_few_stances_are_tried_for_a_spot(plan):
     assert len(tried) == STANCES
     _, tried, most = plan(None, [np.pi / 2] * AROUND, way=False)
     assert len(tried) == STANCES and most == [STANCES], "a hand that floats may point anywhere"
+
+
+@pytest.mark.parametrize(("reaches", "free", "goes"), [(False, True, True), (True, True, False), (False, False, False)])
+def test_a_base_that_stopped_short_of_where_its_arm_reaches_a_grasp_goes_on(reaches, free, goes):
+    """A robot at x = 1 m that looks along y; there is floor 4 cm ahead, or none."""
+    asked = []
+
+    class World(PlannedWorld):
+        base = property(lambda self: (np.array([1.0, 0.0]), np.pi / 2))  # pyright: ignore
+
+        def follows(self, *_):  # pyright: ignore
+            return SimpleNamespace(reaches=lambda point: reaches)
+
+        def obstacles(self, *_):  # pyright: ignore
+            return None
+
+        def floor(self, *_):  # pyright: ignore
+            return SimpleNamespace(nearest=lambda xy, reach: asked.append(xy) or (xy if free else None))
+
+    world = object.__new__(World)
+    world.body = SimpleNamespace(sideways=False, opening=0.1, turned=lambda *_: None)  # pyright: ignore
+    pose = GraspPose(np.array([1.0, 1.0, 0.8]), np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), 0.12)
+    running, phases = grasping._nearer(world, 0, pose), []
+    with pytest.raises(StopIteration) as ended:
+        while True:
+            phases += next(running)
+    assert ended.value.value == goes and len(phases) == goes
+    assert all(p.base == Base.SHIFT and p.xy == pytest.approx((1.0, 0.1)) and p.tolerance == 0.06 for p in phases)
+    assert asked == ([] if reaches else [pytest.approx([1.0, 0.04])])
