@@ -37,7 +37,7 @@ def deepened(geoms: str, body: str = "", **meshes: str) -> mujoco.MjModel:
 @pytest.fixture(autouse=True)
 def with_floors_alone(monkeypatch: pytest.MonkeyPatch):
     """A home differs from what its scene.xml compiles to in its floors only."""
-    for name in ("add_ceiling", "deepen_walls"):
+    for name in ("add_ground", "add_ceiling", "deepen_walls"):
         monkeypatch.setattr(scenes, name, lambda spec, manifest: None)
 
 

@@ -29,6 +29,7 @@ from ig2mj.scene.changes import Change, changes_of, read_change
 from ig2mj.scene.extras import add_joints, extras_as_text, pairs_of, read_extras
 from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
+from ig2mj.scene.ground import add_ground
 from ig2mj.scene.library import find_model
 from ig2mj.scene.manifest import FORMAT_VERSION, UPGRADE, AgentEntry, Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.merging import merged_home
@@ -226,6 +227,7 @@ def _make_solid(spec: mujoco.MjSpec, manifest: Manifest, folder: pathlib.Path) -
                 fix = "manifest.json and scene.xml must come from one conversion: convert the scene again"
                 raise ManifestError(folder / MANIFEST_FILE, problem, element=f"object '{entry.name}'", fix=fix)
     deepen_floors(spec, manifest)
+    add_ground(spec, manifest)
     add_ceiling(spec, manifest)
     deepen_walls(spec, manifest)
     steady_small_bodies(spec, manifest)
