@@ -8,8 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ig2mj.planning import grasping, placing
-from ig2mj.planning.grasps import GraspPose
+from ig2mj.planning import driving, placing
 from ig2mj.planning.phases import Base
 from ig2mj.planning.placing import AROUND, STANCES, Spot
 from ig2mj.planning.world import PlannedWorld, Stance
@@ -89,12 +88,13 @@ def test_only_few_stances_are_tried_for_a_spot(plan):
 
 
 @pytest.mark.parametrize(("reaches", "free", "goes"), [(False, True, True), (True, True, False), (False, False, False)])
-def test_a_base_that_stopped_short_of_where_its_arm_reaches_a_grasp_goes_on(reaches, free, goes):
+def test_a_base_that_stopped_short_of_where_its_arm_reaches_goes_on(reaches, free, goes):
     """A robot at x = 1 m that looks along y; there is floor 4 cm ahead, or none."""
     asked = []
 
     class World(PlannedWorld):
         base = property(lambda self: (np.array([1.0, 0.0]), np.pi / 2))  # pyright: ignore
+        held = property(lambda self: [""])  # pyright: ignore
 
         def follows(self, *_):  # pyright: ignore
             return SimpleNamespace(reaches=lambda point: reaches)
@@ -106,9 +106,7 @@ def test_a_base_that_stopped_short_of_where_its_arm_reaches_a_grasp_goes_on(reac
             return SimpleNamespace(nearest=lambda xy, reach: asked.append(xy) or (xy if free else None))
 
     world = object.__new__(World)
-    world.body = SimpleNamespace(sideways=False, opening=0.1, turned=lambda *_: None)  # pyright: ignore
-    pose = GraspPose(np.array([1.0, 1.0, 0.8]), np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), 0.12)
-    running, phases = grasping._nearer(world, 0, pose), []
+    running, phases = driving.nearer(world, 0, (1.0, 0.0, 0.0, 0.0), np.array([1.0, 1.0, 0.8])), []
     with pytest.raises(StopIteration) as ended:
         while True:
             phases += next(running)

@@ -7,7 +7,7 @@ last part of the way straight ahead, and it backs off straight before it turns a
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -20,7 +20,7 @@ from ig2mj.planning.moves import TOUCHES, UP, Program, go_home, strayed, vector3
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.phases import Base, Phase
 from ig2mj.planning.stances import clear_with_held
-from ig2mj.planning.world import PlannedWorld, Stance
+from ig2mj.planning.world import PlannedWorld, Stance, Vector
 
 BACK = np.arange(0.0, 1.25, 0.1)
 """m before a stance at which there may be room to turn."""
@@ -41,6 +41,10 @@ FORWARDS = np.array([1.0, 0.0, 0.0])
 
 STEP, TURN_STEP = 0.1, 0.12
 """m and rad between stances at which what is held is checked."""
+
+FARTHER, STOPS = 0.04, 0.06
+"""m by which a base on wheels goes on where its arm does not reach what it was to reach from there, and from the end of
+such a way at which it stops."""
 
 PASSED = 0.08
 """m from a point on the way at which a base drives on to the next one."""
@@ -234,6 +238,25 @@ def _keeping(world: PlannedWorld, program: Program) -> Program:
 def stretch(rise: float) -> Phase:
     """The body stretches or stoops, m."""
     return Phase(rise=rise, limit=20, after="")
+
+
+def nearer(
+    world: PlannedWorld, hand: int, quat: Sequence[float] | np.ndarray, point: Vector
+) -> Generator[Program, str, bool]:
+    """A base on wheels goes a little on where it has stopped short of where its arm reaches a point, m, with the hand
+    turned to `quat`; returns whether it did. It does not where it has no room to."""
+    held = world.held[hand]
+    follows = world.follows(hand, quat, world.obstacles([held] if held else []))
+    (here, yaw) = world.base
+    front = np.array([np.cos(yaw), np.sin(yaw)])
+    if follows is None or follows.reaches(point) or front @ (point[:2] - here) <= 0.0:
+        return False
+    if world.floor().nearest((here + FARTHER * front).tolist(), RESOLUTION) is None:
+        return False
+    x, y = (float(v) for v in here + (FARTHER + STOPS) * front)
+    keeps = world.index(held) if held else -1
+    yield [dataclasses.replace(shift(Stance((x, y), yaw), keeps), tolerance=STOPS, limit=BACK_STEPS, after="")]
+    return True
 
 
 def tuck(world: PlannedWorld) -> Program:

@@ -11,7 +11,7 @@ import numpy as np
 from ig2mj.planning.cleaning_area import is_behind, leaves_free
 from ig2mj.planning.clearance import Obstacles, straight
 from ig2mj.planning.drawing_out import drawn_out, has_room
-from ig2mj.planning.driving import go
+from ig2mj.planning.driving import go, nearer
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.grasps import AT_OBJECT, GraspPose, grasp_poses, ordered
 from ig2mj.planning.moves import (
@@ -21,7 +21,6 @@ from ig2mj.planning.moves import (
     UP,
     Primitive,
     Program,
-    ahead,
     carry,
     first_way,
     free_hand,
@@ -33,9 +32,8 @@ from ig2mj.planning.moves import (
     travel,
     vector3,
 )
-from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.opening import Tried, open_around
-from ig2mj.planning.phases import Base, Phase, Until
+from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.stances import reaching_all, stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.taking import closing_on, entries, spheres_of, way_to
@@ -64,10 +62,6 @@ RESTS = 15
 
 ARM_ATTEMPTS = 8
 """Tries of a gripper, whose fingers have to come below or around what a palm only touches."""
-
-FARTHER, SHIFTED = 0.04, 0.06
-"""m by which a base on wheels goes on where its arm does not reach what it was to reach from there, and from the end of
-such a way at which it stops."""
 
 FIRM = 8
 """Agent steps in which fingers close firmly on what they hold by friction alone."""
@@ -223,7 +217,8 @@ def _take(
     index, start = world.index(name), pose.at(pose.before)
     find = functools.partial(way_to, world, name, hand, pose)
     way = yield from from_home(world, hand, find)
-    if way is None and (yield from _nearer(world, hand, pose)):
+    turned = world.body.turned(hand, pose.fingers, pose.palm)
+    if way is None and (yield from nearer(world, hand, turned, pose.at(0.0))):
         way = find()
     if way is None:
         return "no_path", f"the hand has no path to {name}"
@@ -259,22 +254,6 @@ def _take(
     yield [Phase(hand=hand, close=False, pos=back, limit=10, after=""), *travel(hand, way[-2::-1], None), *rest(hand)]
     detail = f"the hand closed on {name} and does not hold it" if reason == "no_grasp" else ""
     return reason or "slipped", detail
-
-
-def _nearer(world: PlannedWorld, hand: int, pose: GraspPose) -> Generator[Program, str, bool]:
-    """A base on wheels goes a little on where it has stopped short of where its arm reaches a grasp; returns whether it
-    had room to."""
-    if world.body.sideways or world.body.opening is None:
-        return False
-    follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), world.obstacles())
-    (here, yaw), front = world.base, ahead(world.base[1])[:2]
-    if follows is None or follows.reaches(pose.at(0.0)) or front @ (pose.point[:2] - here) <= 0.0:
-        return False
-    if world.floor().nearest((here + FARTHER * front).tolist(), RESOLUTION) is None:
-        return False
-    x, y = (float(v) for v in here + (FARTHER + SHIFTED) * front)
-    yield [Phase(Base.SHIFT, xy=(x, y), yaw=yaw, tolerance=SHIFTED, limit=RESTS, after="")]
-    return True
 
 
 def _making_room(world: PlannedWorld, name: str, hand: int) -> Program:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 import numpy as np
 
 from ig2mj.geometry.host_rotations import about_vertical
-from ig2mj.planning.driving import go
+from ig2mj.planning.driving import go, nearer
 from ig2mj.planning.moves import (
     ATTEMPTS,
     UP,
@@ -121,7 +121,12 @@ def hold_at(
             return "slipped", [], -1
         if stuck:
             continue
-        planned = yield from from_home(world, hand, functools.partial(_way, world, name, hand, target, turned))
+        find = functools.partial(_way, world, name, hand, target, turned)
+        planned = yield from from_home(world, hand, find)
+        if planned is None and name in world.held:
+            quat = world.turned_hand(hand, turned)
+            went = yield from nearer(world, hand, quat, target)
+            planned = find() if went and name in world.held else None
         if planned is not None:
             start, way = planned
             quat, keeps = world.turned_hand(hand, turned), world.index(name)

@@ -14,7 +14,7 @@ from ig2mj.geometry.host_rotations import about_vertical
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.clearance import HELD, Obstacles, straight
-from ig2mj.planning.driving import go
+from ig2mj.planning.driving import go, nearer
 from ig2mj.planning.grasping import grasp, is_graspable, release, with_free_hand
 from ig2mj.planning.moves import (
     ATTEMPTS,
@@ -123,7 +123,12 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             if name not in world.held:
                 reason, detail = "slipped", f"the hand lost {name}"
                 continue
-            planned = yield from from_home(world, hand, functools.partial(way_to_spot, world, name, hand, spot))
+            find = functools.partial(way_to_spot, world, name, hand, spot)
+            planned = yield from from_home(world, hand, find)
+            if planned is None and name in world.held:
+                target, quat, _ = grip_for(world, hand, name, spot)
+                if (yield from nearer(world, hand, quat, target + (LET_GO + spot.drop) * UP)) and name in world.held:
+                    planned = find()
             if planned is None:
                 reason, detail = "no_path", f"the hand has no way with {name} to its place"
                 continue
