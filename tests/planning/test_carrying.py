@@ -63,8 +63,10 @@ POINTS = np.array([[0.0, 0.0], [3.5, 0.0]])
 
 
 def test_what_is_held_is_turned_where_the_corridor_ends():
-    way = carried_way(_World(), POINTS, np.pi / 2)
-    assert way is not None
+    found = carried_way(_World(), POINTS, np.pi / 2)
+    assert found is not None
+    way, up = found
+    assert up == 0.0
     assert way[-1].xy == (3.5, 0.0) and np.isclose(way[-1].yaw, np.pi / 2)
     turned = [s for s in way if abs(s.yaw) > 0.5]
     assert turned and all(s.xy[0] >= 2.0 for s in turned)
@@ -73,14 +75,31 @@ def test_what_is_held_is_turned_where_the_corridor_ends():
 def test_there_is_no_way_that_turns_in_a_corridor_without_end():
     assert carried_way(_World(opens=False), POINTS, np.pi / 2) is None
     straight = carried_way(_World(opens=False), POINTS, 0.0)
-    assert straight is not None and len({round(s.yaw, 6) for s in straight}) == 1
+    assert straight is not None and len({round(s.yaw, 6) for s in straight[0]}) == 1
 
 
 def test_what_is_held_is_not_turned_through_what_is_thinner_than_a_turn_by_one_heading():
     """From one heading to the next the end of the rod moves by 0.5 m: neither meets the pole, the turn does."""
     pole, ahead = _Pole(0.0, 1.5 * 2 * np.pi / HEADINGS), np.array([[0.0, 0.0], [0.0, 0.0]])
     world = _World(corridor=pole)
-    way = carried_way(world, ahead, np.pi / 2)
-    assert way is not None
-    yaws = np.unwrap([0.0, *(s.yaw for s in way)])
+    found = carried_way(world, ahead, np.pi / 2)
+    assert found is not None
+    yaws = np.unwrap([0.0, *(s.yaw for s in found[0])])
     assert yaws.min() < -np.pi  # the other way around
+
+
+class _Chair(Obstacles):
+    """Across all of the way, 1.1 m high."""
+
+    def __init__(self):
+        pass
+
+    def clear(self, spheres):
+        x, _, z, radius = spheres.T
+        return not ((np.abs(x - 1.5) < 0.1) & (z - radius < 1.1)).any()
+
+
+def test_what_is_held_is_raised_over_what_it_would_meet_up_to_the_heads_of_doors():
+    found = carried_way(_World(corridor=_Chair()), POINTS, 0.0, (0.05, 0.15, 0.3))
+    assert found is not None and found[1] == 0.15
+    assert carried_way(_World(corridor=_Chair()), POINTS, 0.0, (0.05, 0.9)) is None

@@ -46,6 +46,9 @@ class _World(PlannedWorld):
         assert list(without) == ["rod"]
         return self._room
 
+    def reaches(self, hand, stance, point):
+        return False
+
     def hand_axes(self, hand, rotation=None):
         return np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0])
 

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import heapq
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from ig2mj.geometry.host_rotations import about_vertical
 from ig2mj.planning.moves import TOUCHES
-from ig2mj.planning.world import PlannedWorld, Stance
+from ig2mj.planning.world import HIGHEST, PlannedWorld, Stance
 
 HEADINGS, APART = 16, 0.1
 """Directions that the robot may face on the way, and m between the places of the way at which it may turn, at most."""
@@ -27,25 +28,33 @@ TURN = 0.15
 """m of way that a turn by one heading counts as."""
 
 
-def carried_way(world: PlannedWorld, points: Float[np.ndarray, "N 2"], yaw: float) -> list[Stance] | None:
-    """Stances one after another, between which the base shifts, or turns where it is; None: there is no such way. Where
-    there is none on which what is held keeps clear, it is brought past other things that closely; where there is none,
-    either, it may brush past them between two headings.
+def carried_way(
+    world: PlannedWorld, points: Float[np.ndarray, "N 2"], yaw: float, higher: Sequence[float] = ()
+) -> tuple[list[Stance], float] | None:
+    """Stances one after another, between which the base shifts, or turns where it is, and m by which its hands are
+    raised before; None: there is no such way. Where there is none on which what is held keeps clear, it is raised, or
+    brought past other things closely; where there is none, either, it may brush past them between two headings.
 
     Args:
-      points: of a way over the floor; the first is where the robot is. yaw: rad, at its end.
+      points: of a way over the floor; the first is where the robot is. yaw: rad, at its end. higher: m by which hands
+        may be raised, as over the backs of chairs.
     """
-    ways = (_carried_way(world, points, yaw, share, fine) for fine in (True, False) for share in (1.0, TOUCHES))
-    return next((way for way in ways if way is not None), None)
+    clearly = [(1.0, True, up) for up in (0.0, *higher) if up + float(_held(world)[:, 2].max(initial=0.0)) < HIGHEST]
+    closely = [(TOUCHES, True, 0.0), (1.0, False, 0.0), (TOUCHES, False, 0.0)]
+    for share, fine, up in (*(clearly or [(1.0, True, 0.0)]), *closely):
+        if (way := _carried_way(world, points, yaw, share, fine, up)) is not None:
+            return way, up
+    return None
 
 
 def _carried_way(
-    world: PlannedWorld, points: Float[np.ndarray, "N 2"], yaw: float, share: float, fine: bool
+    world: PlannedWorld, points: Float[np.ndarray, "N 2"], yaw: float, share: float, fine: bool, up: float
 ) -> list[Stance] | None:
-    """`carried_way` with a share of the radii of what is held. fine: it keeps clear between two headings, too."""
+    """`carried_way` with a share of the radii of what is held, raised by `up`, m. fine: it keeps clear between two
+    headings, too."""
     places = _sampled(points)
     (here, now), last = world.base, len(places) - 1
-    held = _held(world) * (1.0, 1.0, 1.0, share)
+    held = _held(world) * (1.0, 1.0, 1.0, share) + (0.0, 0.0, up, 0.0)
     obstacles = world.obstacles([n for n in world.held if n and not world.domain.fixed(n)])
     step = 2 * np.pi / HEADINGS
     goal = last, round((yaw - now) / step) % HEADINGS

@@ -65,6 +65,9 @@ QUICK = 0.12
 TURN_STEPS = 120
 """Agent steps of a turn at the end of a way, at most: with something in the hand a base turns slowly."""
 
+HIGHER = (0.15, 0.3)
+"""m by which hands raise what they carry where it would meet something, as the back of a chair, on its way."""
+
 AT_LEAST, SLOWEST = 100, 0.02
 """Agent steps that a stretch of the way may take at least, and m in an agent step of the slowest base: its limit."""
 
@@ -151,10 +154,19 @@ def _carried(world: PlannedWorld, standing: FreeFloor, stance: Stance) -> Progra
     """The program of a base that goes sideways and backwards where there is no room to turn with what is held; empty:
     there is no such way."""
     points = standing.way(world.base[0], stance.xy)
-    stances = None if points is None else carried_way(world, points, stance.yaw)
-    if stances is None:
+    grips = {h: world.grip(h) for h, n in enumerate(world.held) if n and not world.domain.fixed(n)}
+    alone = all(world.held.count(world.held[h]) == 1 for h in grips)  # two hands raise nothing one after the other
+    higher = [up for up in HIGHER if all(world.reaches(h, world.stance, g + up * UP) for h, g in grips.items())]
+    found = None if points is None else carried_way(world, points, stance.yaw, higher if alone else ())
+    if found is None:
         return []
-    program, before = [], world.base[0]
+    stances, up = found
+    raises = [
+        Phase(hand=h, pos=vector3(g + up * UP), tolerance=0.04, limit=25, after="")
+        for h, g in grips.items()
+        if up > 0.0
+    ]
+    program, before = list[Phase](raises), world.base[0]
     for there in stances:
         limit = AT_LEAST + int(np.linalg.norm(np.subtract(there.xy, before)) / SLOWEST)
         program.append(dataclasses.replace(shift(there), tolerance=0.05, turn_tolerance=0.12, limit=limit))

@@ -247,7 +247,7 @@ def _take(
             carries = carry(world, hand, keeps=index)
             ends = [start + lift, *points, world.carried(hand, world.stance)]
             out = None if has_room(world, name, hand, ends) else drawn_out(world, name, hand, carries)
-            reason = yield leaves if out is None else [*_making_room(world, name, hand), *out]
+            reason = yield [*leaves[:-1], carries] if out is None else [*_making_room(world, name, hand), *out]
     if name in world.held:
         return "", ""
     back = vector3(world.grip(hand) - pose.before * pose.palm)
