@@ -1,9 +1,11 @@
 """Programs of a batch of worlds as arrays."""
 
 import numpy as np
+import pytest
 
 from ig2mj.planning import execution
-from ig2mj.planning.phases import Phase, Programs
+from ig2mj.planning.phases import Phase, Programs, Until
+from ig2mj.planning.senses import Senses
 
 
 def test_new_programs_of_some_worlds_leave_the_others_as_they_are():
@@ -25,3 +27,17 @@ def test_a_batch_that_is_packed_at_once_is_the_same():
     for name in ("length", "base", "pos", "moves", "hand", "close", "limit", "after"):
         a, b = getattr(one, name), getattr(two, name)
         assert np.array_equal(a[..., : b.shape[-1]] if a.shape != b.shape else a, b), name
+
+
+@pytest.mark.parametrize(("until", "held", "fails"), [
+    (Until.HELD, "drawer", True), (Until.HELD, "pen", False), (Until.HELD, "", False), (Until.WAITED, "drawer", False),
+])  # fmt: skip
+def test_a_hand_that_closes_on_an_object_and_holds_another_one_does_not_go_on(until, held, fails):
+    """What it holds meets it no more, so that it would press the object through that."""
+    names, held_by = ["pen", "drawer"], np.zeros((1, 2, 2), bool)
+    if held:
+        held_by[0, 1, names.index(held)] = True
+    senses = object.__new__(Senses)
+    object.__setattr__(senses, "held", held_by)
+    programs = Programs.pack([[Phase(hand=1, until=until, object=names.index("pen"), close=True, limit=15)]])
+    assert execution._holds_another(senses, programs.at(np.zeros(1, int))).tolist() == [fails]

@@ -112,7 +112,7 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     """
     senses = sense(view, agent, body.hands, body.friction)
     rows = carry.rows
-    there, lost = _ended(body, senses, rows), _lost(senses, rows)
+    there, lost, wrong = _ended(body, senses, rows), _lost(senses, rows), _holds_another(senses, rows)
     still = np.where(_hand_is_still(carry, senses, rows), carry.still + 1, 0)
     if isinstance(body, HandedBody) and body.opening is not None:
         ends = (rows["until"] == Until.TOUCHED) | ((rows["until"] == Until.THERE) & (rows["after"] == 0))
@@ -124,6 +124,7 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     late = (carry.steps >= rows["limit"]) | (stood >= STUCK)
     waited = late & (rows["until"] == Until.WAITED)
     failed = np.where(lost, REASON_NUMBERS.index("slipped"), np.where(late & ~there & ~waited, rows["after"], 0))
+    failed = np.where(wrong, REASON_NUMBERS.index("no_grasp"), failed)
     passed = there | waited | (late & (failed == 0))
     running = carry.running
     forward = running & passed & (failed == 0)
@@ -214,6 +215,17 @@ def _far(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
     turned = np.abs((rows["yaw"] - senses.yaw + np.pi) % (2 * np.pi) - np.pi)
     goes = (rows["base"] == Base.DRIVE) | (rows["base"] == Base.SHIFT)
     return (goes & (apart > NEAR)) | ((rows["base"] == Base.TURN) & (turned > TURNED_NEAR))
+
+
+def _holds_another(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
+    """Worlds in which a hand that closes on an object holds another one, such as the drawer that it lies in: it takes
+    hold of nothing else any more, and would press the object through what it no longer meets."""
+    world, hand = np.arange(len(rows["hand"])), np.maximum(rows["hand"], 0)
+    if not senses.held.shape[1]:
+        return np.zeros(len(world), bool)
+    holds = senses.held[world, hand]
+    closes = (rows["until"] == Until.HELD) & (rows["hand"] >= 0) & (rows["object"] >= 0)
+    return closes & holds.any(1) & ~holds[world, np.maximum(rows["object"], 0)]
 
 
 def _lost(senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
