@@ -7,7 +7,7 @@ import ig2mj
 from ig2mj.agents import Fetch
 from ig2mj.agents.grasping.grasp import MAX_DISTANCE
 from ig2mj.agents.task_robot import TaskRobot
-from ig2mj.planning.arm_model import FASTEST
+from ig2mj.planning.arm_model import FASTEST, POINTS, STEPS
 from ig2mj.planning.arms import BACK, DRAWN_BACK, PART, ArmBody, in_parts
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
@@ -145,3 +145,23 @@ def test_a_hand_that_carries_something_is_moved_back_to_where_it_does_by_little(
         moves.append(float(np.linalg.norm(body._carried_back(at, np.ones(1, bool))[0])))
     assert moves[0] == pytest.approx(0.0, abs=1e-6) and 0.0 < moves[1] < moves[2] <= DRAWN_BACK + 1e-9
     assert not body._carried_back(at, np.zeros(1, bool)).any(), "where the base stands, the hand is asked by its phase"
+
+
+def test_a_way_whose_point_a_hand_comes_no_nearer_to_is_given_up_early(body):
+    _, quat = body.model.hand(body.model.rest[None])
+    for point, most in (([3.0, 0.0, 1.0], STEPS / 2), ([0.5, 0.0, 0.9], STEPS)):
+        points = np.tile(np.array(point, np.float32), (POINTS, 1))
+        joints, number = body.model._follow(np.asarray(body.model.rest), points, np.tile(quat, (POINTS, 1)))
+        steps = int(np.argmax((np.asarray(joints) == np.asarray(joints)[-1]).all(1)))
+        assert 0 < steps < most and (number[-1] == POINTS) == (point[0] < 1.0)
+    assert body.model.follow(body.model.rest, np.array([[3.0, 0.0, 1.0]]), quat) is None
+
+
+def test_ways_that_begin_where_a_hand_turns_follow_it_there_once(body, monkeypatch):
+    quat, followed = np.array(body.turned(0, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])), []
+    found = follower(body, [0.0, 0.0, 9.0], quat, monkeypatch)
+    old = found._followed
+    monkeypatch.setattr(found, "_followed", lambda points, q: followed.append(len(points)) or old(points, q))
+    for x in (0.5, 0.6):
+        assert found([np.array([x, 0.0, 0.9])], np.zeros((0, 4)), np.array([0.5, 0.1, 0.9])) is not None
+    assert len(followed) == 3

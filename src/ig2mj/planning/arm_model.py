@@ -47,6 +47,10 @@ HANDS = 64
 POINTS, STEPS = 8, 160
 """Points of a way, and agent steps, for which following it is compiled; longer ways are followed in parts."""
 
+IDLE, NEARER, RADIUS = 30, 0.001, 0.3
+"""Agent steps in which a hand comes no nearer to a point of a way, by so many m, after which it is given up; and m that
+a rad of turning counts as."""
+
 UNFUSED = {"xla_disable_hlo_passes": "fusion"}
 """Options of XLA on the host, where fused operations compute what is before a joint again for each column of the
 Jacobian: inverse kinematics take 1.0 ms without fusion, and 5.8 ms with it."""
@@ -136,11 +140,12 @@ class ArmModel:
         """[T, J] joints and [T] number of the point that is gone for; points [P, 3], quats [P, 4]."""
 
         def goes_on(carry: tuple[Array, ...]) -> Array:
-            _, k, t, _, _ = carry
-            return (k < POINTS) & (t < STEPS)
+            _, k, t, _, _, _, idle = carry
+            return (k < POINTS) & (t < STEPS) & (idle < IDLE)
 
         def step(carry: tuple[Array, ...]) -> tuple[Array, ...]:
-            q, k, t, joints, number = carry  # [1, J], numbers of a point and of an agent step, and what is returned
+            # [1, J], numbers of a point and of an agent step, what is returned; the least left, and for how long
+            q, k, t, joints, number, least, idle = carry
             at = jnp.minimum(k, POINTS - 1)
             pos, quat = self._hand(q)
             move, turn = points[at] - pos, rotation_vector(multiply(quats[at][None], conjugate(quat)))
@@ -148,11 +153,15 @@ class ArmModel:
             there = (far < NEAR) & ((angle < TURNED_NEAR) | (at < POINTS - 1))
             move = PULL * move * jnp.minimum(1.0, FASTEST / jnp.maximum(PULL * far, 1e-6))
             turn = PULL * turn * jnp.minimum(1.0, TURN_FASTEST / jnp.maximum(PULL * angle, 1e-6))
-            new = self._step(q, move, turn)
-            return new, jnp.where(there, k + 1, k), t + 1, _with_row(joints, t, q[0]), _with_row(number, t, k)
+            new, left = self._step(q, move, turn), far + RADIUS * angle
+            comes = there | (left < least - NEARER)
+            least, idle = jnp.where(there, jnp.inf, jnp.where(comes, left, least)), jnp.where(comes, 0, idle + 1)
+            after = jnp.where(there, k + 1, k), t + 1, _with_row(joints, t, q[0]), _with_row(number, t, k), least, idle
+            return new, *after
 
-        begins = q[None], jnp.int32(0), jnp.int32(0), jnp.zeros((STEPS, len(q)), q.dtype), jnp.zeros(STEPS, jnp.int32)
-        q, k, t, joints, number = jax.lax.while_loop(goes_on, step, begins)
+        rows = jnp.zeros((STEPS, len(q)), q.dtype), jnp.zeros(STEPS, jnp.int32)
+        begins = q[None], jnp.int32(0), jnp.int32(0), *rows, jnp.asarray(jnp.inf, q.dtype), jnp.int32(0)
+        q, k, t, joints, number, _, _ = jax.lax.while_loop(goes_on, step, begins)
         after = jnp.arange(STEPS) >= t
         return jnp.where(after[:, None], q, joints), jnp.where(after, k, number)
 

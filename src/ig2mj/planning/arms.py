@@ -270,6 +270,7 @@ class ArmFollower:
     ):
         self._model, self._links, self._q, self._obstacles = model, links, q, obstacles
         self._pos, yaw = base
+        self._turns: dict[bytes, np.ndarray | None] = {}
         self._base = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
         self._quat = np.asarray(quat_multiply(quat_conjugate(self._base), quat), float)
 
@@ -290,12 +291,19 @@ class ArmFollower:
     ) -> bool:
         """Whether the hand gets along points of the world from where it is, and links and hand have room. See
         `Follower`."""
-        turned = None if turned_at is None else self._followed([turned_at], self._q)
+        turned = None if turned_at is None else self._turned_at(np.asarray(turned_at, float))
         points = points if turned_at is None else in_parts(turned_at, points)
         found = self._followed(points, self._q if turned is None else turned[-1])
         if found is None or not self._clear(np.concatenate([found[EVERY::EVERY], found[-1:]])):
             return False
         return self._hand_is_clear(np.concatenate([found[HAND_EVERY::HAND_EVERY], found[-1:]]), spheres)
+
+    def _turned_at(self, point: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T J"] | None:
+        """Joints while the hand turns at a point: many ways begin there."""
+        key = point.tobytes()
+        if key not in self._turns:
+            self._turns[key] = self._followed([point], self._q)
+        return self._turns[key]
 
     def passes(self, points: Sequence[np.ndarray]) -> bool:
         """See `Follower.passes`."""
