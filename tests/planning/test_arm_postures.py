@@ -7,6 +7,7 @@ import ig2mj
 from ig2mj.agents import Fetch
 from ig2mj.agents.grasping.grasp import MAX_DISTANCE
 from ig2mj.agents.task_robot import TaskRobot
+from ig2mj.planning import grasps
 from ig2mj.planning.arm_model import FASTEST, POINTS, STEPS
 from ig2mj.planning.arms import BACK, DRAWN_BACK, PART, ArmBody, in_parts
 from ig2mj.planning.body_kinds import body_of
@@ -165,3 +166,21 @@ def test_ways_that_begin_where_a_hand_turns_follow_it_there_once(body, monkeypat
     for x in (0.5, 0.6):
         assert found([np.array([x, 0.0, 0.9])], np.zeros((0, 4)), np.array([0.5, 0.1, 0.9])) is not None
     assert len(followed) == 3
+
+
+class _Front(Obstacles):
+    """Of a drawer: 2 cm thick and 20 cm high from a height (m) on, 5 cm before x = 0."""
+
+    def __init__(self, height):
+        self._middle = np.array([-0.05, 0.0, height + 0.1])
+
+    def distance(self, points):
+        beyond = np.abs(points - self._middle) - [0.01, 0.5, 0.1]
+        return np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(-1), 0.0)
+
+
+@pytest.mark.parametrize(("height", "passes"), [(0.0, True), (0.2, False), (0.9, True)])
+def test_a_gripper_does_not_come_to_a_grasp_through_the_front_of_a_drawer(body, height, passes):
+    """The gripper is level, at 0.3 m."""
+    at, across, out = np.array([[0.0, 0.0, 0.3]]), np.array([[0.0, 1.0, 0.0]]), np.array([[1.0, 0.0, 0.0]])
+    assert grasps._passes(body, _Front(height), at, across, out).tolist() == [passes]

@@ -111,7 +111,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         found = _plan(world, name, hand, tried, prefers)
         while found is None and (yield from open_around(world, name, moved)):
             found = _plan(world, name, hand, tried, prefers)
-        if found is None and world.body.opening is None:
+        if found is None:
             found = _plan(world, name, hand, tried, prefers, AT_OBJECT)
         if found is None:
             reason, detail = "no_base", f"no free floor from which a hand has a way to {name}"

@@ -59,6 +59,10 @@ GRAZE, SCRAPE = 0.025, 2.0
 """m by which fingertips may seem to enter what is around the object, which stops them, and discomfort of entering
 farther: a finger that closes on a table presses the hand off it."""
 
+PASSING, CATCHES = (0.03, 0.05, 0.07, 0.09), 0.003
+"""m before a grasp at which an open gripper is looked at on its way there, and by which it seems to enter something
+that stops it."""
+
 APART = 0.03
 """m between points of a side."""
 
@@ -228,6 +232,8 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles, room: floa
     low = (points[:, 2] < corners[:, 2].min() + LOW) & (np.abs(palms[:, 2]) < UPRIGHT)
     burden = np.minimum(lever / MOST_TORQUE, 1.0) + low
     good = np.flatnonzero(before > 0)
+    if room == 1.0:  # else also where the hand may have to push its way
+        good = good[_passes(body, obstacles, points[good], fingers[good], palms[good])]
     scrapes = ~_fingers_have_room(body, obstacles, points[good], fingers[good], palms[good])
     order = np.lexsort((np.arange(len(good)), deep[good] < BELOW, scrapes, which[good]))
     good, scrapes = good[order], scrapes[order]
@@ -331,6 +337,25 @@ def _fingers_have_room(
     corners = np.stack([body.hand_corners(f, p) for f, p in zip(fingers, palms, strict=True)]) + points[:, None]
     distance = obstacles.distance(corners)
     return np.all(distance > -GRAZE, axis=1)
+
+
+def _passes(
+    body: HandedBody,
+    obstacles: Obstacles,
+    points: Float[np.ndarray, "N 3"],
+    fingers: Float[np.ndarray, "N 3"],
+    palms: Float[np.ndarray, "N 3"],
+) -> Bool[np.ndarray, "N"]:
+    """Whether open grippers meet nothing on their last way to some poses, straight ahead: not the front of a drawer,
+    behind which there is room again. Other hands do not."""
+    room = np.ones(len(points), bool)
+    if not len(points) or body.opening is None:
+        return room
+    corners = np.stack([body.hand_corners(f, p) for f, p in zip(fingers, palms, strict=True)]) + points[:, None]
+    for away in PASSING:
+        left = np.flatnonzero(room)
+        room[left] = np.all(obstacles.distance(corners[left] - away * palms[left, None]) > -CATCHES, axis=1)
+    return room
 
 
 def _room(
