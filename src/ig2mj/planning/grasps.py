@@ -59,7 +59,7 @@ GRAZE, SCRAPE = 0.025, 2.0
 """m by which fingertips may seem to enter what is around the object, which stops them, and discomfort of entering
 farther: a finger that closes on a table presses the hand off it."""
 
-PASSING, CATCHES = (0.03, 0.05, 0.07, 0.09), 0.003
+PASSING, CATCHES = np.arange(0.03, 0.105, 0.01), 0.003
 """m before a grasp at which an open gripper is looked at on its way there, and by which it seems to enter something
 that stops it."""
 
