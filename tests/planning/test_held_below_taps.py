@@ -42,6 +42,12 @@ def test_it_still_passes_below_the_heads_of_doors():
     assert Carrying(0.4, HIGHEST).carry(0)[2] == pytest.approx(0.5)
 
 
+def world_with(**given: Any) -> PlannedWorld:
+    """A world of which nothing else is asked; `facts` may be set."""
+    members = {name: staticmethod(value) if callable(value) else value for name, value in given.items()}
+    return object.__new__(type("World", (PlannedWorld,), {"facts": None, **members}))
+
+
 def held_below_tap(monkeypatch, world: Any, **stand_ins: Any) -> Outcome:
     """How holding a cup below a tap ends. `stand_ins`: functions of `taps` in place of its own."""
     usual = {"wait_until": lambda *given: iter(()), "carry": lambda *given: None}
@@ -57,7 +63,7 @@ def held_below_tap(monkeypatch, world: Any, **stand_ins: Any) -> Outcome:
 
 @pytest.mark.parametrize("losses", [1, 2])
 def test_what_is_lost_on_the_way_to_a_tap_is_taken_again(monkeypatch, losses):
-    world: Any = SimpleNamespace(held=["cup", ""], index=lambda name: 0, base=(np.zeros(2), 0.0))
+    world: Any = world_with(held=["cup", ""], index=lambda name: 0, base=(np.zeros(2), 0.0))
     wet = []
     world.facts = SimpleNamespace(holds=lambda *condition: bool(wet))
     taken = []
@@ -87,7 +93,7 @@ def test_what_is_lost_on_the_way_to_a_tap_is_taken_again(monkeypatch, losses):
 
 @pytest.mark.parametrize("cleared", [True, False])
 def test_what_is_lost_while_a_basin_is_cleared_is_taken_again(monkeypatch, cleared):
-    world: Any = SimpleNamespace(held=["cup", ""], index=lambda name: 0, base=(np.zeros(2), 0.0))
+    world: Any = world_with(held=["cup", ""], index=lambda name: 0, base=(np.zeros(2), 0.0))
     world.facts = SimpleNamespace(holds=lambda *condition: True)
     calls = []
 
@@ -117,7 +123,7 @@ def test_what_is_lost_while_a_basin_is_cleared_is_taken_again(monkeypatch, clear
 
 @pytest.mark.parametrize(("held", "out"), [(["cup", "plate"], ["plate"]), (["cup", ""], []), (["cup"], [])])
 def test_what_the_other_hand_holds_is_brought_out_where_nothing_else_gives_room(monkeypatch, held, out):
-    world: Any = SimpleNamespace(held=held, index=lambda name: 0, base=(np.zeros(2), 0.0))
+    world: Any = world_with(held=held, index=lambda name: 0, base=(np.zeros(2), 0.0))
     world.facts = SimpleNamespace(holds=lambda *condition: not all(world.held))
     brought = []
 
@@ -141,7 +147,7 @@ def test_what_the_other_hand_holds_is_brought_out_where_nothing_else_gives_room(
 
 @pytest.mark.parametrize("opened", [True, False])
 def test_what_is_put_down_for_a_free_hand_is_taken_again_whatever_came_of_it(monkeypatch, opened):
-    world: Any = SimpleNamespace(held=["rag"])
+    world: Any = world_with(held=["rag"])
 
     def release(world, step):
         world.held[0] = ""
