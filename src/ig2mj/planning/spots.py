@@ -36,8 +36,10 @@ ROOFED, COLUMN = 1.0, np.arange(0.15, 0.8, 0.08)
 WIDE = 0.8
 """Share of the middle edge of an object's box that has to have room above a spot."""
 
-LATER_SPOTS = 8
-"""Candidates of an area of which the predicate is asked, at most."""
+FAR_SPOTS, LATER_SPOTS, ELSEWHERE = 24, 8, 0.1
+"""Candidates of an area of which the predicate is asked, at most, and once more where it is false at all of these; m
+from one at which it is false within which it is asked once more only: on the open door of a dishwasher nothing is
+inside of it."""
 
 TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 """rad about the vertical that an object may be turned by, from how it is held in front of the robot."""
@@ -122,7 +124,7 @@ def spots_for(
             return
         new = _yawed(quat, angle)
         for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
-            found, asked = list[Vector](), 0
+            found = list[Vector]()
             positions = np.array(list(placer.spots(index, areas, new, world.rng, support))).reshape(-1, 3)
             cost = farther(positions)
             if predicate == "on_floor":
@@ -132,20 +134,38 @@ def spots_for(
                 roofed = _roofed(positions, around, wide)
                 cost += np.linalg.norm((positions - middle)[:, :2], axis=1) + ROOFED * roofed
                 cost[_shut_away(positions, drawers)] = np.inf
-            for k in np.argsort(cost, kind="stable"):
-                pos = positions[k]
-                if not np.isfinite(cost[k]) or len(found) == EACH or asked == LATER_SPOTS:
-                    break
-                if any(np.linalg.norm(pos - other) < SPREAD for other in found):
-                    continue
-                asked += 1
-                at, turn = (pos, new) if hanging is None else _hanging(world, name, pos, new, hanging, angle)
+            for k in _varied(positions, cost, found):
+                at, turn = (
+                    (positions[k], new) if hanging is None else _hanging(world, name, positions[k], new, hanging, angle)
+                )
                 if not without_contact or _would_hold(world, without_contact, name, at, turn):
-                    found.append(pos)
+                    found.append(positions[k])
                     proposed += 1
                     yield Spot(at, turn, bool(roofed[k]))
             if found:
                 break
+
+
+def _varied(
+    positions: Float[np.ndarray, "n 3"], cost: Float[np.ndarray, "n"], found: Sequence[Vector]
+) -> Iterator[int]:
+    """Numbers of positions, the cheapest first, of which the caller puts those that are right into `found`: `SPREAD`
+    apart, and `ELSEWHERE` from those that were not right; where none of these is right, closer ones."""
+    order = np.argsort(cost, kind="stable")
+    left = np.isfinite(cost)[order]
+    for apart, most in ((ELSEWHERE, FAR_SPOTS), (0.0, LATER_SPOTS)):
+        free = left.copy()
+        for _ in range(most):
+            if len(found) == EACH or not free.any():
+                break
+            place = int(np.argmax(free))
+            k, known = int(order[place]), len(found)
+            yield k
+            far = np.linalg.norm(positions[order] - positions[k], axis=1)
+            free &= far >= (SPREAD if len(found) > known else apart)
+            left[place] = free[place] = False
+        if len(found):
+            break
 
 
 def spots_upon(world: PlannedWorld, name: str, where: str) -> Iterator[Spot]:
