@@ -1,13 +1,46 @@
 """Objects are brought into contact with others, or out of the way."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import ig2mj
 from ig2mj.agents.humanoid import Humanoid
-from ig2mj.planning import primitives
+from ig2mj.planning import primitives, pushing
 from ig2mj.planning.pushing import push_aside
-from ig2mj.planning.steps import Outcome
+from ig2mj.planning.steps import Outcome, Step
+
+
+def test_what_has_no_place_on_the_other_is_put_next_to_it_and_pushed(monkeypatch):
+    world = SimpleNamespace(held=["mat_0", ""], facts=SimpleNamespace(holds=lambda *_: gap[0] <= 0.0))
+    gap, done = [0.6], list[str]()
+
+    def place(predicate, until=""):
+        def put(world, step):
+            yield from ()
+            done.append(step.primitive)
+            if predicate == "on_top":
+                return Outcome("no_base")
+            world.held[0] = ""
+            return Outcome()
+
+        return put
+
+    def stroke(world, name, ways, failed):
+        yield from ()
+        done.append("stroke")
+        gap[0] -= 0.4
+        return "", 0.4
+
+    monkeypatch.setattr(pushing, "is_graspable", lambda *_: True)
+    monkeypatch.setattr(pushing, "place", place)
+    monkeypatch.setattr(pushing, "_push_once", stroke)
+    monkeypatch.setattr(pushing, "_towards", lambda *_: [(np.array([1.0, 0.0, 0.0]), gap[0])])
+    with pytest.raises(StopIteration) as end:
+        next(pushing.push(world, Step("push", ("mat_0", "plant_0"))))  # pyright: ignore
+    assert done == ["place_on_top", "place_next_to", "stroke", "stroke"]
+    assert end.value.value.done and end.value.value.attempts == 2, "strokes that go on are no further tries"
 
 
 @pytest.mark.slow

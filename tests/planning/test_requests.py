@@ -10,11 +10,13 @@ from ig2mj.cli import call
 from ig2mj.cli.common.plan_benchmark import _jobs, figure_cells, primitive_figures
 from ig2mj.knowledge.substances import WATER
 from ig2mj.planning.domain import Domain
+from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.requests import MEASURED, Request, RequestSource, added_to
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.many import make_sampler
 from ig2mj.scene.scene import load_scene
+from ig2mj.simulation import requests
 from ig2mj.simulation.requests import RequestBench
 from ig2mj.states.model import StateModel
 
@@ -116,7 +118,9 @@ def test_shares_are_of_requests_that_are_prepared_and_have_a_solution():
     found = primitive_figures(rows, "open")
     assert (found["asked"], found["prepared"], found["feasible"]) == (5, 4, 3)
     assert (found["first_try"], found["with_retries"], found["failures"]) == (1, 2, {"no_path": 1})
-    assert figure_cells("open", found)[3:6] == ("75.0 %", "33.3 %", "66.7 %")
+    assert figure_cells("open", found)[3:7] == ("-", "75.0 %", "33.3 %", "66.7 %")
+    found = primitive_figures([{**row, "symbolic": row["reason"] != "no_base"} for row in rows], "open")
+    assert figure_cells("open", found)[3] == "75.0 %"
     assert primitive_figures(rows, "close") == {}
 
 
@@ -159,3 +163,30 @@ def test_requests_are_carried_out_on_the_kinematic_rung():
     bench = RequestBench("small_home", "kinematic")
     row = bench.run("open", 0)
     assert row["prepared"] and row["solution"] and row["reason"] == "" and row["planning"] > 0
+
+
+def test_what_no_hand_takes_hold_of_or_reaches_is_no_solution(monkeypatch):
+    bench = object.__new__(RequestBench)
+    box = np.zeros(3), np.array([0.1, 0.1, 2.4])
+    symbolic = SimpleNamespace(
+        begin=lambda *_: None, advance=lambda: {0: Outcome()}, facts=lambda world: SimpleNamespace(box=lambda name: box)
+    )
+    monkeypatch.setattr(bench, "_symbolic", lambda *_: symbolic)
+    bench._domain = SimpleNamespace(graspable=lambda name: name == "cup_0", loose=())  # pyright: ignore
+    rung = object.__new__(PhysicsRung)
+    monkeypatch.setattr(PhysicsRung, "world", lambda self, world: None)
+
+    def solution(step, reach=2.0):
+        above = lambda world, without: lambda points: np.where(points[:, 2] > reach, np.inf, 0.0)  # noqa: E731
+        monkeypatch.setattr(requests, "out_of_reach", above)
+        return bench._solution(SimpleNamespace(), Request(step), rung, 0)  # pyright: ignore
+
+    assert solution(Step("grasp", ("cup_0",))) == (True, True)
+    assert solution(Step("grasp", ("floor_lamp_0",))) == (True, False)
+    onto = Step("place_on_top", ("cup_0", "top_cabinet_0"))
+    assert solution(onto) == (True, True), "a part of it is low enough"
+    assert solution(onto, reach=-1.0) == (True, False)
+    assert solution(Step("open", ("top_cabinet_0",)), reach=-1.0) == (True, False)
+    assert solution(Step("pour", ("cup_0", "top_cabinet_0", WATER)), reach=-1.0) == (True, True)
+    symbolic.advance = lambda: {0: Outcome("not_true_after")}
+    assert solution(onto) == (False, False)

@@ -19,14 +19,14 @@ def _right(positions, cost, holds):
 @pytest.fixture
 def door_and_rack():
     """Positions upon the open door of a dishwasher, which come first, and in its rack."""
-    door = np.stack(np.meshgrid(np.linspace(0.0, 0.3, 16), np.linspace(-0.3, 0.3, 31), [0.17]), -1).reshape(-1, 3)
-    rack = np.stack(np.meshgrid(np.linspace(0.5, 0.7, 11), np.linspace(-0.2, 0.2, 21), [0.49]), -1).reshape(-1, 3)
+    door = np.stack(np.meshgrid(np.linspace(0.0, 0.7, 36), np.linspace(-0.3, 0.3, 31), [0.17]), -1).reshape(-1, 3)
+    rack = np.stack(np.meshgrid(np.linspace(0.8, 1.0, 11), np.linspace(-0.2, 0.2, 21), [0.49]), -1).reshape(-1, 3)
     return np.concatenate([door, rack])
 
 
 def test_a_rack_is_asked_behind_a_door_that_is_full_of_candidates(door_and_rack):
     cost = door_and_rack[:, 0]
-    nearest = np.argsort(cost, kind="stable")[: FAR_SPOTS]
+    nearest = np.argsort(cost, kind="stable")[:FAR_SPOTS]
     assert (door_and_rack[nearest, 2] < 0.2).all()
     found, asked = _right(door_and_rack, cost, lambda pos: pos[2] > 0.3)
     assert found and asked <= FAR_SPOTS

@@ -61,15 +61,19 @@ def push(world: PlannedWorld, step: Step) -> Primitive:
     name, other = step.arguments
     if world.facts.holds("in_contact_with", name, other):
         return Outcome()
+    tries = 1
     if is_graspable(world, name):
         taken = Outcome() if name in world.held else (yield from grasp(world, Step("grasp", (name,))))
         if taken.done:
             onto = Step("place_on_top", (name, other))
             put = yield from place("on_top", until="in_contact_with")(world, onto)
+            if not put.done and name in world.held:  # it is put down where little is left to push
+                yield from place("next_to")(world, Step("place_next_to", (name, other)))
             if put.done or name in world.held:
                 return put
+        tries += 1
     reason, detail = "no_base", f"no free floor from which a hand can push {name} towards {other}"
-    failed, tries, missed = 0, 1, False
+    failed, missed = 0, False
     for _ in range(ROUNDS):
         if world.facts.holds("in_contact_with", name, other):
             return Outcome(attempts=tries)

@@ -36,10 +36,10 @@ ROOFED, COLUMN = 1.0, np.arange(0.15, 0.8, 0.08)
 WIDE = 0.8
 """Share of the middle edge of an object's box that has to have room above a spot."""
 
-FAR_SPOTS, LATER_SPOTS, ELSEWHERE = 24, 8, 0.1
+FAR_SPOTS, LATER_SPOTS, ELSEWHERE, LEVEL = 32, 8, 0.1, 0.1
 """Candidates of an area of which the predicate is asked, at most, and once more where it is false at all of these; m
-from one at which it is false within which it is asked once more only: on the open door of a dishwasher nothing is
-inside of it."""
+from one at which it is false within which it is asked once more only, and of height of places that are about as high:
+on the open door of a dishwasher nothing is inside of it."""
 
 TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 """rad about the vertical that an object may be turned by, from how it is held in front of the robot."""
@@ -105,7 +105,7 @@ def spots_for(
     requested = [Condition(predicate, (name, where)), *also]
     areas = areas_for(world.query, world.domain.model, name, [c for c in requested if c.value])
     without_contact = [c for c in requested if c.predicate in WITHOUT_CONTACT]
-    placer, farther = Placer(world.query), _out_of_reach(world)
+    placer, farther = Placer(world.query), out_of_reach(world)
     middle = _middle_of_fixed_part(world, where) if predicate == "inside" else None
     own = (
         openable_joints(world.stage.scene, world.view, world.index(where), world.world) if predicate == "inside" else []
@@ -150,9 +150,11 @@ def _varied(
     positions: Float[np.ndarray, "n 3"], cost: Float[np.ndarray, "n"], found: Sequence[Vector]
 ) -> Iterator[int]:
     """Numbers of positions, the cheapest first, of which the caller puts those that are right into `found`: `SPREAD`
-    apart, and `ELSEWHERE` from those that were not right; where none of these is right, closer ones."""
+    apart, and `ELSEWHERE` from those that were not right, of which at most `LATER_SPOTS` are about as high; where none
+    of these is right, closer ones."""
     order = np.argsort(cost, kind="stable")
     left = np.isfinite(cost)[order]
+    level = np.round(positions[order, 2] / LEVEL)
     for apart, most in ((ELSEWHERE, FAR_SPOTS), (0.0, LATER_SPOTS)):
         free = left.copy()
         for _ in range(most):
@@ -164,6 +166,9 @@ def _varied(
             far = np.linalg.norm(positions[order] - positions[k], axis=1)
             free &= far >= (SPREAD if len(found) > known else apart)
             left[place] = free[place] = False
+            own = level == level[place]
+            if apart and not len(found) and np.count_nonzero(own & ~left & np.isfinite(cost[order])) >= LATER_SPOTS:
+                free &= ~own
         if len(found):
             break
 
@@ -257,12 +262,18 @@ def _shut_away(positions: Float[np.ndarray, "n 3"], drawers: Sequence[OpenableJo
     return shut & ~out
 
 
-def _out_of_reach(world: PlannedWorld) -> Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n"]]:
+def out_of_reach(
+    world: PlannedWorld, without: Sequence[int] = ()
+) -> Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, "n"]]:
     """How far positions are from where a hand is comfortable, m, for a robot on floor that it has a way to;
-    infinite: no hand reaches there."""
+    infinite: no hand reaches there.
+
+    Args:
+      without: objects, by number, that are in no way.
+    """
     import scipy.ndimage  # takes long to import
 
-    floor, (here, _) = world.floor(), world.base
+    floor, (here, _) = world.floor(without=without), world.base
     reached = np.isfinite(floor.distances(here, NEAR_START))
     apart = np.full(reached.shape, np.inf)
     if reached.any():

@@ -1,9 +1,10 @@
 """Carries out drawn requests to primitives (`ig2mj.planning.requests`) in one home, each from the home's start.
 
 A request is *prepared* if what must hold first could be sampled and taken into the hands, and states among it still
-hold then: water does not stay in a glass that lies on its side. It *has a solution* if the symbolic rung carries it out
-from the same state (the sampler finds a state in which the primitive's condition holds), or the rung that is measured
-does.
+hold then: water does not stay in a glass that lies on its side. It *has a solution* if the rung that is measured
+carries it out, or the symbolic rung does from the same state (the sampler finds a state in which the primitive's
+condition holds) and hands could: what is grasped is of a category that hands take hold of and, in physics, some part
+of what is acted on, or of where it is placed, XX
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.physics import PhysicsRung
 from ig2mj.planning.requests import MEASURED, Request, RequestSource, added_to
 from ig2mj.planning.rung import Rung
+from ig2mj.planning.spots import out_of_reach
 from ig2mj.planning.starts import open_doors, start_place
 from ig2mj.planning.steps import Outcome, PlanningError, Step
 from ig2mj.planning.symbolic import SymbolicRung
@@ -47,6 +49,13 @@ from ig2mj.simulation.simulation import Simulation
 
 RUNGS = ("symbolic", "kinematic", "physics")
 """Rungs that can be measured."""
+
+PLACED, LATTICE = 4, 5
+"""States in which a placement holds that are sampled until one of them is within a hand's reach; points along each axis
+of an object's box, of which one has to be."""
+
+WHERE_IT_IS = ("navigate_to", "grasp", "open", "close", "toggle_on", "toggle_off", "wipe", "scrub")
+"""Primitives that act on their first argument where it is."""
 
 DRAWS, WORK = 20, 400
 """Draws until a home has something that can be asked; units of sampling what must hold first."""
@@ -152,8 +161,8 @@ class RequestBench:
         row, why = self._start(request, rng)
         if row is None:
             return {**found, "detail": why}
-        solution = self._carried_out(self._symbolic(row, number), request)
         rung = self._rung(row, request.step, number)
+        symbolic, possible = self._solution(row, request, rung, number)
         for name in request.taken:
             taken = _outcome(rung, Step("grasp", (name,)))
             if not taken.done:
@@ -165,7 +174,8 @@ class RequestBench:
         return {
             **found,
             "prepared": True,
-            "solution": solution.done or outcome.done,
+            "symbolic": symbolic,
+            "solution": possible or outcome.done,
             "reason": outcome.reason,
             "detail": outcome.detail,
             "attempts": outcome.attempts,
@@ -200,8 +210,30 @@ class RequestBench:
             return self._physics(self._simulation, row, step, number)
         return self._symbolic(row, number) if self._stage is None else self._kinematic(self._stage, row, step, number)
 
-    def _symbolic(self, row: Row, number: int) -> SymbolicRung:
-        return SymbolicRung(self._domain, self._sampler, [(row.physics, row.states)], self._seed, number)
+    def _symbolic(self, row: Row, number: int, again: int = 0) -> SymbolicRung:
+        """`again`: number of the try, for other random streams."""
+        seed = self._seed + 1_000_003 * again
+        return SymbolicRung(self._domain, self._sampler, [(row.physics, row.states)], seed, number)
+
+    def _solution(self, row: Row, request: Request, rung: Rung, number: int) -> tuple[bool, bool]:
+        """Whether the symbolic rung carries a request out, and whether hands could: see the module's text."""
+        step = request.step
+        if not self._carried_out(first := self._symbolic(row, number), request).done:
+            return False, False
+        if step.primitive == "grasp" and not self._domain.graspable(step.object):
+            return True, False
+        places = step.primitive.startswith("place_")
+        if not isinstance(rung, PhysicsRung) or not (places or step.primitive in WHERE_IT_IS):
+            return True, True
+        farther = out_of_reach(rung.world(0), [self._domain.index(n) for n in self._domain.loose])
+        for again in range(PLACED if places else 1):
+            acted = first if not again else self._symbolic(row, number, again)
+            if not again or self._carried_out(acted, request).done:
+                low, high = (np.asarray(v, float) for v in acted.facts(0).box(step.object))
+                shares = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, LATTICE)] * 3), axis=-1).reshape(-1, 3)
+                if np.isfinite(farther(low + shares * (high - low))).any():
+                    return True, True
+        return True, False
 
     def _kinematic(self, stage: KinematicStage, row: Row, step: Step, number: int) -> KinematicRung:
         query, physics = self._sampler.query, row.physics

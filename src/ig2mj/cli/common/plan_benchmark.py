@@ -15,8 +15,8 @@ TOGETHER = 8
 """Requests of one home that a process carries out, one after another."""
 
 COLUMNS = (
-    "primitive", ">asked", ">prepared", ">has a solution", ">first try", ">with retries", ">median s", ">95 % s",
-    "?failures",
+    "primitive", ">asked", ">prepared", ">symbolic", ">has a solution", ">first try", ">with retries", ">median s",
+    ">95 % s", "?failures",
 )  # fmt: skip
 
 
@@ -123,9 +123,10 @@ def _jobs(
 def primitive_figures(rows: Sequence[Row], primitive: str) -> Row:
     """Figures of one primitive; none where it was not asked.
 
-    `asked`, `prepared`: requests. `feasible`: prepared ones that have a solution. `first_try`, `with_retries`: of the
-    feasible ones, those that succeed. `planning`: median and 95th percentile, s of processor time. `failures`: counts
-    of the reasons of feasible ones.
+    `asked`, `prepared`: requests. `symbolic`: prepared ones that the symbolic rung carries out; None: not every row
+    says so. `feasible`: those that have a solution. `first_try`, `with_retries`: of the feasible ones, those that
+    succeed. `planning`: median and 95th percentile, s of processor time. `failures`: counts of the reasons of feasible
+    ones.
     """
     own = [row for row in rows if row["primitive"] == primitive]
     if not own:
@@ -142,6 +143,7 @@ def primitive_figures(rows: Sequence[Row], primitive: str) -> Row:
     return {
         "asked": len(own),
         "prepared": len(prepared),
+        "symbolic": sum(row["symbolic"] for row in prepared) if all("symbolic" in row for row in prepared) else None,
         "feasible": len(feasible),
         "first_try": sum(row["attempts"] == 1 for row in done),
         "with_retries": len(done),
@@ -158,6 +160,7 @@ def figure_cells(name: str, found: Row) -> tuple[str, ...]:
         name,
         str(found["asked"]),
         str(prepared),
+        "-" if not prepared or found.get("symbolic") is None else f"{100 * found['symbolic'] / prepared:.1f} %",
         f"{100 * feasible / prepared:.1f} %" if prepared else "-",
         f"{100 * found['first_try'] / feasible:.1f} %" if feasible else "-",
         f"{100 * found['with_retries'] / feasible:.1f} %" if feasible else "-",
