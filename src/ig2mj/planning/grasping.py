@@ -95,7 +95,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
     if not is_graspable(world, name):
         return Outcome("no_grasp", f"{name} is fixed, or its category allows no assisted grasp")
     reason, detail, tried, moved = "no_grasp", "", list[GraspPose](), Tried()
-    nowhere, attempts = 0, ATTEMPTS if world.body.opening is None else ARM_ATTEMPTS
+    nowhere, missed, attempts = 0, 0, ATTEMPTS if world.body.opening is None else ARM_ATTEMPTS
     for attempt in range(attempts):
         if nowhere and nowhere >= world.held.count(""):  # no hand finds a way
             break
@@ -119,7 +119,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
                 reason, detail = "no_grasp", f"the gripper fits around no part of {name} that it has room at"
             nowhere += 1
             continue
-        nowhere = 0
+        nowhere, missed = 0, missed + 1
         (stance, pose), before = found, world.com(name)
         if reason := (yield from go(world, stance)):
             detail = f"no path leads to where a hand reaches {name}"
@@ -132,8 +132,8 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         tried.append(pose)
         reason, detail = yield from _take(world, name, hand, pose, attempt)
         if name in world.held:
-            return Outcome(attempts=attempt + 1)
-    return Outcome(reason or "no_grasp", detail, attempts=attempts)
+            return Outcome(attempts=missed)
+    return Outcome(reason or "no_grasp", detail, attempts=max(missed, 1))
 
 
 def held_again(world: PlannedWorld, name: str) -> Generator[Program, str, bool]:

@@ -91,7 +91,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
         if world.domain.hands_for(name) > 1:
             return (yield from place_with_both(world, predicate, step, until))
         turned_over, righted = not turns_over, predicate != "inside"
-        reason, detail, opened = "no_base", "", Tried()
+        reason, detail, opened, tries = "no_base", "", Tried(), 0
         for attempt in range(ATTEMPTS):
             if name not in world.held:  # it fell, or was put where the relation is false
                 again = yield from grasp(world, Step("grasp", (name,)))
@@ -106,7 +106,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                     if (yield from set_upright(world, where)):
                         continue
                 if name not in world.held:  # a hand that opened something for it, or set that up, has met it
-                    reason, detail = "slipped", f"the hand lost {name}"
+                    reason, detail, tries = "slipped", f"the hand lost {name}", tries + 1
                     continue
                 if found == _NO_WAY and not turned_over and (yield from regrasp(world, name, hand)):
                     turned_over = True
@@ -115,8 +115,9 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                     yield from release(world, Step("release", (name,)))  # where the robot stands, in that room
                     placed, detail = put_there(world.facts, step, until or predicate)
                     if placed and not detail:
-                        return Outcome(attempts=attempt + 1)
+                        return Outcome(attempts=tries + 1)
                 break
+            tries += 1  # to take it by another side, or to set a container upright, is none
             stance, spot = found
             if reason := (yield from go(world, stance)):
                 continue
@@ -138,11 +139,11 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 reason = reason or "not_true_after"
                 continue
             if not detail:
-                return Outcome(attempts=attempt + 1)
+                return Outcome(attempts=tries)
             reason = "not_true_after"
             if not also or attempt > 0:
                 break
-        return Outcome(reason or "not_true_after", detail, attempts=ATTEMPTS)
+        return Outcome(reason or "not_true_after", detail, attempts=max(tries, 1))
 
     return place
 
