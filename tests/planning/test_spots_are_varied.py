@@ -6,10 +6,10 @@ import pytest
 from ig2mj.planning.spots import EACH, FAR_SPOTS, SPREAD, _varied
 
 
-def _right(positions, cost, holds):
+def _right(positions, cost, holds, refused=()):
     """What is found among positions, and how many are asked."""
     found, asked = [], 0
-    for k in _varied(positions, cost, found):
+    for k in _varied(positions, cost, found, list(refused)):
         asked += 1
         if holds(positions[k]):
             found.append(positions[k])
@@ -49,3 +49,10 @@ def test_a_small_place_between_others_is_found_in_the_end():
 def test_nothing_is_asked_where_no_hand_reaches():
     positions = np.zeros((5, 3))
     assert _right(positions, np.full(5, np.inf), lambda pos: True) == ([], 0)
+
+
+def test_places_next_to_those_that_were_refused_are_asked_last(door_and_rack):
+    cost = door_and_rack[:, 0]
+    upon = [p for p in door_and_rack if p[2] < 0.3]
+    found, asked = _right(door_and_rack, cost, lambda pos: pos[2] > 0.3, upon)
+    assert len(found) == EACH == asked

@@ -123,6 +123,7 @@ def spots_for(
         if proposed and number >= len(TURNS) * ORIENTATIONS and world.body.opening is None:
             return
         new = _yawed(quat, angle)
+        refused = list[Vector]()
         for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
             found = list[Vector]()
             positions = np.array(list(placer.spots(index, areas, new, world.rng, support))).reshape(-1, 3)
@@ -134,7 +135,7 @@ def spots_for(
                 roofed = _roofed(positions, around, wide)
                 cost += np.linalg.norm((positions - middle)[:, :2], axis=1) + ROOFED * roofed
                 cost[_shut_away(positions, drawers)] = np.inf
-            for k in _varied(positions, cost, found):
+            for k in _varied(positions, cost, found, refused):
                 at, turn = (
                     (positions[k], new) if hanging is None else _hanging(world, name, positions[k], new, hanging, angle)
                 )
@@ -147,22 +148,30 @@ def spots_for(
 
 
 def _varied(
-    positions: Float[np.ndarray, "n 3"], cost: Float[np.ndarray, "n"], found: Sequence[Vector]
+    positions: Float[np.ndarray, "n 3"], cost: Float[np.ndarray, "n"], found: Sequence[Vector], refused: list[Vector]
 ) -> Iterator[int]:
     """Numbers of positions, the cheapest first, of which the caller puts those that are right into `found`: `SPREAD`
     apart, and `ELSEWHERE` from those that were not right, of which at most `LATER_SPOTS` are about as high; where none
-    of these is right, closer ones."""
+    of these is right, closer ones.
+
+    Args:
+      refused: those that were not right before, to which these are added.
+    """
     order = np.argsort(cost, kind="stable")
     left = np.isfinite(cost)[order]
     level = np.round(positions[order, 2] / LEVEL)
     for apart, most in ((ELSEWHERE, FAR_SPOTS), (0.0, LATER_SPOTS)):
         free = left.copy()
+        for other in refused if apart else ():
+            free &= np.linalg.norm(positions[order] - other, axis=1) >= apart
         for _ in range(most):
             if len(found) == EACH or not free.any():
                 break
             place = int(np.argmax(free))
             k, known = int(order[place]), len(found)
             yield k
+            if len(found) == known:
+                refused.append(positions[k])
             far = np.linalg.norm(positions[order] - positions[k], axis=1)
             free &= far >= (SPREAD if len(found) > known else apart)
             left[place] = free[place] = False
