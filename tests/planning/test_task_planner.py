@@ -349,6 +349,15 @@ def test_a_container_is_not_brought_out_again_and_again(step, serves, counts):
     assert sum(episode.failed_steps.values()) == 3 * counts and not episode.failed
 
 
+def test_what_had_no_place_in_a_container_is_put_there_where_that_is_now():
+    episode = _Episode({}, 0.0)
+    for words in ("place_inside apple pan", "place_inside apple box", "grasp pan"):
+        primitive, *arguments = words.split()
+        episode.learn(Step(primitive, tuple(arguments)), Outcome("no_path"))
+    episode.learn(Step("place_on_top", ("pan", "stove")), Outcome())
+    assert dict(episode.failed_steps) == {"place_inside apple box": 1, "grasp pan": 1}
+
+
 def test_a_container_that_is_carried_out_of_a_narrow_place_is_put_on_the_floor_not_released_where_it_was(
     sampler, start
 ):

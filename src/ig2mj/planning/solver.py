@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ig2mj.planning.rung import Rung
-from ig2mj.planning.steps import Outcome, PlanningError, Step
+from ig2mj.planning.steps import PLACE, Outcome, PlanningError, Step
 from ig2mj.planning.task_planner import TaskPlan, TaskPlanner
 from ig2mj.predicates.explain import value_of
 from ig2mj.predicates.logic import Atom
@@ -86,6 +86,8 @@ class _Episode:
         if outcome.done:
             if step.primitive not in ("navigate_to", "release"):
                 self.stuck.clear()
+            if step.primitive in PLACE.values():
+                self._forget_places_in(step.arguments[0])
             if brings_out(step):
                 self.failed_steps[str(step)] += 1
             return
@@ -93,6 +95,11 @@ class _Episode:
         if step.serves is not None:
             self.failed[step.serves] += 1
             self.stuck.add(step.serves)
+
+    def _forget_places_in(self, name: str) -> None:
+        """What had no place in a container may have one where that has been put."""
+        for text in [t for t in self.failed_steps if t.startswith("place_inside ") and t.endswith(f" {name}")]:
+            del self.failed_steps[text]
 
 
 def solve(
