@@ -65,8 +65,20 @@ def test_scratch_memory_stays_where_the_user_did_not_decide(monkeypatch, theirs,
     assert os.environ["XLA_FLAGS"] == after
 
 
-def test_xla_knows_the_option_that_keeps_scratch_memory_in_place():
-    code = "from ig2mj import process; process.keep_scratch_in_place(); print(jax.jit(lambda x: x + 1)(1))"
+def test_products_are_left_to_cublas_where_the_user_did_not_decide(monkeypatch):
+    for theirs, after in (
+        ("--a=1", "--a=1 --xla_gpu_enable_triton_gemm=false"),
+        ("--xla_gpu_enable_triton_gemm=true", "--xla_gpu_enable_triton_gemm=true"),
+    ):
+        monkeypatch.setenv("XLA_FLAGS", theirs)
+        settings.leave_products_to_cublas()
+        settings.leave_products_to_cublas()
+        assert os.environ["XLA_FLAGS"] == after
+
+
+@pytest.mark.parametrize("setting", ["keep_scratch_in_place", "leave_products_to_cublas"])
+def test_xla_knows_its_options(setting):
+    code = f"from ig2mj import process; process.{setting}(); print(jax.jit(lambda x: x + 1)(1))"
     assert in_a_process_of_its_own(code, XLA_FLAGS="") == "2"
 
 

@@ -88,8 +88,10 @@ def run(
     import sys
     import time
 
+    from ig2mj.process import leave_products_to_cublas
     from ig2mj.process.imports import find_gpu
 
+    leave_products_to_cublas()
     if engine != "native" and jobs == 1 and cluster is None:
         find_gpu(os.environ)  # while the rest is imported
 

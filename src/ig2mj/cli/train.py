@@ -95,9 +95,10 @@ def run(
     import os
 
     from ig2mj.learn.run_files import run_table
-    from ig2mj.process import keep_scratch_in_place
+    from ig2mj.process import keep_scratch_in_place, leave_products_to_cublas
     from ig2mj.process.imports import find_gpu
 
+    leave_products_to_cublas()
     table = {} if config is None else run_table(config)
     if _on_one_device(table, set, devices, os.environ):
         if _has_several_programs(table, set):

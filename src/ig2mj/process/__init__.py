@@ -23,6 +23,9 @@ or earlier by any caller; a second call does nothing. What the user has decided 
 `keep_scratch_in_place` (`ig2mj train` on several devices):
   - XLA_FLAGS gets XLA's option `xla_gpu_temp_buffer_use_separate_color`, unless it has it.
 
+`leave_products_to_cublas` (`ig2mj train`, `ig2mj evaluate`):
+  - XLA_FLAGS gets XLA's option `xla_gpu_enable_triton_gemm`, off, unless it has it.
+
 `prepare_mujoco` (every engine):
   - MuJoCo's user warning: what it warns of goes to the logger "ig2mj.mujoco", not to a file in the working folder.
 
@@ -64,6 +67,7 @@ from ig2mj.process.compilation import CACHE_VARIABLE, cache_folder
 from ig2mj.process.entry import entry_point
 from ig2mj.process.settings import (
     keep_scratch_in_place,
+    leave_products_to_cublas,
     prepare_jax,
     prepare_mujoco,
     prepare_warp,
@@ -79,6 +83,7 @@ __all__ = [
     "cache_folder",
     "entry_point",
     "keep_scratch_in_place",
+    "leave_products_to_cublas",
     "prepare_jax",
     "prepare_mujoco",
     "prepare_warp",

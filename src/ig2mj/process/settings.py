@@ -81,9 +81,26 @@ def keep_scratch_in_place() -> None:
 
     Has an effect only before JAX is first used. Does nothing where XLA_FLAGS has the option already.
     """
+    _tell_xla(SCRATCH_IN_PLACE, "true")
+
+
+TRITON_GEMM = "xla_gpu_enable_triton_gemm"
+"""XLA's option for kernels of its own for products of matrices; it compiles and times dozens for each shape."""
+
+
+def leave_products_to_cublas() -> None:
+    """XLA takes NVIDIA's kernels for products of matrices: a training with images compiles in five sixths of the time,
+    and is as fast (`docs/notes/start.md`).
+
+    Has an effect only before JAX is first used. Does nothing where XLA_FLAGS has the option already.
+    """
+    _tell_xla(TRITON_GEMM, "false")
+
+
+def _tell_xla(option: str, value: str) -> None:
     flags = os.environ.get("XLA_FLAGS", "")
-    if SCRATCH_IN_PLACE not in flags:
-        os.environ["XLA_FLAGS"] = f"{flags} --{SCRATCH_IN_PLACE}=true".lstrip()
+    if option not in flags:
+        os.environ["XLA_FLAGS"] = f"{flags} --{option}={value}".lstrip()
 
 
 def use_processor_only() -> None:
