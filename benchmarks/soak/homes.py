@@ -29,8 +29,10 @@ import time
 from typing import Any
 
 import jax
+import mujoco
 import numpy as np
 import tyro
+import warp as wp
 
 from benchmarks.harness import results
 from benchmarks.harness.homes import shipped_homes
@@ -152,7 +154,10 @@ def part(cell: Cell, args: Args) -> dict[str, Any]:
         )
         found = grasping.soak(of_robot, cell.mode)
     keep = ("world_steps", "world_steps_per_s", "ready_s", "flagged", "events", "gain_J", "held_when_flagged")
-    return {"wall_s": round(time.monotonic() - began, 1), **{name: found[name] for name in keep if name in found}}
+    counted = {name: found[name] for name in keep if name in found}
+    versions = {"jax": jax.__version__, "warp": wp.__version__, "mujoco": mujoco.__version__}
+    of = {"device": str(jax.devices()[0].device_kind), "worlds_together": args.worlds, **versions}
+    return {"wall_s": round(time.monotonic() - began, 1), **counted, **of}
 
 
 def at_rest(home: str, args: Args) -> dict[str, Any]:
@@ -213,6 +218,7 @@ def run(args: Args) -> None:
                 print(f"time is over; the same command goes on with {cell.name}", file=sys.stderr)
                 return
             row = _in_a_process(cell, args, left, seconds, len(rows), spare)
+            row |= {**results.provenance()}
             results.keep_row({"cell": cell.name, **dataclasses.asdict(cell), **row}, args.rows[0])
 
 

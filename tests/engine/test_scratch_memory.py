@@ -7,6 +7,7 @@ import ctypes
 import random
 import types
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
@@ -14,8 +15,12 @@ import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
 from tumbling_shapes import SCENE
 
+from ig2mj import load_scene
+from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.engine.warp.patches import awake_kernels, pins, scratch
 from ig2mj.engine.warp.patches.scratch import ALIGNMENT, Arena, Counter
+from ig2mj.engine.warp.profile import default_profile
+from ig2mj.errors import EngineError
 
 
 class Elsewhere:
@@ -115,3 +120,21 @@ def test_steps_need_nothing_of_what_was_in_their_memory_before(monkeypatch):
     expected = after(60, None)
     assert abs(expected - model.qpos0).max() > 0.1 and np.isfinite(expected).all()
     assert np.array_equal(after(60, Poisoned(64 << 20)), expected)
+
+
+def test_too_little_memory_for_a_home_without_measured_sizes_names_the_remedy(monkeypatch):
+    scene = load_scene("small_home")
+    engine = WarpEngine(scene, 1)
+    monkeypatch.setattr(engine, "profile", default_profile(scene.model))
+    monkeypatch.setattr(engine, "_scratch", 7 * 10**11)
+    monkeypatch.setattr(wp, "device_from_jax", lambda device: device)
+
+    def reserve(device, size):
+        raise RuntimeError(f"Failed to allocate {size} bytes on device 'cuda:0'")
+
+    monkeypatch.setattr(scratch, "reserve", reserve)
+    with pytest.raises(EngineError, match=r"700 GB for 1 worlds: .*ig2mj calibrate small_home"):
+        engine.prepare_devices(["cuda:0"])
+    monkeypatch.setattr(engine, "profile", msgspec.structs.replace(engine.profile, awake_dofs=1))
+    with pytest.raises(EngineError, match="use fewer worlds, smaller images"):  # its sizes are measured
+        engine.prepare_devices(["cuda:0"])

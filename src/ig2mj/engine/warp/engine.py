@@ -35,8 +35,10 @@ from ig2mj.engine.warp.patches import scratch, table
 from ig2mj.engine.warp.patches.flags import REPLACED
 from ig2mj.engine.warp.profile import EngineProfile, fit, holding, holds_everything, profile_of_scene
 from ig2mj.engine.warp.unwritten import unwritten_is_zero
+from ig2mj.errors import EngineError
 from ig2mj.process import entry_point, prepare_warp
 from ig2mj.process.gc_pause import Traced
+from ig2mj.process.out_of_memory import is_out_of_memory
 from ig2mj.scene.scene import Scene
 
 
@@ -154,9 +156,22 @@ class WarpEngine(MjxEngine):
         return super().reset()
 
     def prepare_devices(self, devices: Sequence[Any]) -> None:
-        """See `Engine.prepare_devices`: takes the memory that steps need (`ig2mj.engine.warp.patches.scratch`)."""
+        """See `Engine.prepare_devices`: takes the memory that steps need (`ig2mj.engine.warp.patches.scratch`).
+
+        Raises:
+          EngineError: there is too little for a scene whose buffer sizes nobody has measured.
+        """
         for device in devices if self._scratch else ():
-            scratch.reserve(wp.device_from_jax(device), self._scratch)
+            try:
+                scratch.reserve(wp.device_from_jax(device), self._scratch)
+            except RuntimeError as failure:
+                if not (is_out_of_memory(failure) and holds_everything(self.profile, self.scene.model)):
+                    raise
+                name, needed = self.scene.name, f"{self._scratch / 1e9:,.0f} GB for {self.num_worlds:,} worlds"
+                raise EngineError(
+                    f"buffers for all that can happen in {name} need {needed}: "
+                    f"measure what it needs (ig2mj calibrate {name}), or use fewer worlds"
+                ) from failure
 
     def launches(self, counter: scratch.Counter | None = None) -> list[kernels.Launch]:
         """The kernels of a step, of a forward pass and of the contact filter. `counter`: see `launches_of_step`."""
