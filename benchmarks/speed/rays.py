@@ -13,6 +13,7 @@ for it.
 - `block_N`: threads of a block; a tile of 64 rays is one or several of them.
 - `registers_N`: the most registers of a thread; 0: as many as the compiler chooses.
 - `size_N`: images of other sizes. `cameras_N`: the eye and N - 1 of the robot's other cameras.
+- `cameras_3+registers_0`: both at once.
 
 `differs`: share of pixels that differ from `base` by more than 1 of 255 in a channel; `most`: the largest difference.
 """
@@ -52,16 +53,20 @@ PARTS = ("slots", "poses", "refit")
 """Variants that make no image."""
 
 
+def number_in(variant: str, name: str, otherwise: int) -> int:
+    """N of the variant's part `name_N`; `otherwise` where it has no such part."""
+    return next(
+        (int(part.removeprefix(f"{name}_")) for part in variant.split("+") if part.startswith(f"{name}_")), otherwise
+    )
+
+
 @contextlib.contextmanager
 def built(variant: str) -> Iterator[None]:
     """Trees of merged meshes and the kernel are built as the variant says."""
     before = triangle_trees.LEAF, triangle_trees.BINS, shading.REGISTERS
-    if variant.startswith("leaf_"):
-        triangle_trees.LEAF = int(variant[5:])
-    if variant.startswith("bins_"):
-        triangle_trees.BINS = int(variant[5:])
-    if variant.startswith("registers_"):
-        shading.REGISTERS = int(variant[10:]) or None
+    triangle_trees.LEAF = number_in(variant, "leaf", before[0])
+    triangle_trees.BINS = number_in(variant, "bins", before[1])
+    shading.REGISTERS = number_in(variant, "registers", before[2] or 0) or None
     try:
         yield
     finally:
@@ -74,17 +79,17 @@ def camera_of(env: Any, variant: str, looks: str) -> BatchCamera:
     model, tables = scene.model, scene.tables
     eye = model.camera(int(tables.agent_camera[0])).name
     own = [model.camera(k).name for k in range(model.ncam) if tables.body_agent[model.cam_bodyid[k]] == 0]
-    count = int(variant[8:]) if variant.startswith("cameras_") else 1
+    count = number_in(variant, "cameras", 1)
     names = [eye, *(name for name in own if name != eye)][:count]
     if len(names) < count:
         raise SystemExit(f"error: the robot has {len(names)} cameras, not {count}")
-    size = int(variant[5:]) if variant.startswith("size_") else 128
-    shape = {"width": size, "height": size, "rgb": variant != "depth", "depth": True}
+    size = number_in(variant, "size", 128)
+    shape = {"width": size, "height": size, "rgb": "depth" not in variant.split("+"), "depth": True}
     with built(variant):
         camera = BatchCamera(env.core.engine, env.core.rules.model, names, looks=looks, **shape)
-    if variant.startswith("block_"):
+    if block := number_in(variant, "block", 0):
         impl = camera._model._impl
-        blocks = dataclasses.replace(impl.block_dim, render=int(variant[6:]))
+        blocks = dataclasses.replace(impl.block_dim, render=block)
         camera._model = camera._model.replace(_impl=impl.replace(block_dim=blocks))
     return camera
 
@@ -148,7 +153,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             jax.block_until_ready(program())
             spent[variant].append((time.perf_counter() - began) / args.calls)
     for variant, seconds in spent.items():
-        count = args.worlds * (int(variant[8:]) if variant.startswith("cameras_") else 1)
+        count = args.worlds * number_in(variant, "cameras", 1)
         row = {
             "benchmark": "rays",
             "variant": variant,

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import solid_homes
 
+import ig2mj
+from ig2mj.agents import Humanoid
 from ig2mj.scene.floors import DEPTH, deepen_floors
 from ig2mj.scene.ground import BELOW, BESIDE, GROUND, add_ground
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest, ObjectEntry
@@ -89,3 +91,10 @@ def test_nothing_that_rests_in_a_home_touches_it_and_no_object_contains_it(with_
     for _ in range(100):
         mujoco.mj_step(plain.model, other)
     assert (data.qpos == other.qpos).all(), "the same to the bit"
+
+
+def test_what_passes_through_floors_passes_through_it():
+    """The humanoid's body, which a crouch lowers below the floor's surface."""
+    model = ig2mj.load_scene("small_home", [Humanoid()]).model
+    body, ground = model.body("humanoid").id, model.body(GROUND).id
+    assert ((min(body, ground) << 16) + max(body, ground)) in model.exclude_signature

@@ -29,7 +29,7 @@ from ig2mj.scene.changes import Change, changes_of, read_change
 from ig2mj.scene.extras import add_joints, extras_as_text, pairs_of, read_extras
 from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
-from ig2mj.scene.ground import add_ground
+from ig2mj.scene.ground import GROUND, add_ground
 from ig2mj.scene.library import find_model
 from ig2mj.scene.manifest import FORMAT_VERSION, UPGRADE, AgentEntry, Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.merging import merged_home
@@ -412,9 +412,10 @@ def _attach_all(agents: Sequence[Agent], spec: mujoco.MjSpec, manifest: Manifest
             raise Ig2mjError(f"robot '{getattr(agent, 'name', agent)}' cannot be added to the scene: {e}") from e
     for entry in entries:
         for body, categories in entry.no_contact.items():
-            for passed in (o for o in manifest.objects if o.category in categories):
-                for name in passed.bodies:
-                    spec.add_exclude(bodyname1=body, bodyname2=name)
+            passed = [name for o in manifest.objects if o.category in categories for name in o.bodies]
+            below = [GROUND] if "floors" in categories and spec.body(GROUND) is not None else []
+            for name in (*passed, *below):
+                spec.add_exclude(bodyname1=body, bodyname2=name)
     add_grasp_equalities(spec, manifest, entries)
     return entries
 
