@@ -55,7 +55,9 @@ def test_a_hand_that_sticks_to_the_steak_carries_it_to_the_burner(env):
         held = np.asarray(state.info["held"])
         level = np.linalg.norm((steak - hand)[:, :2], axis=1, keepdims=True) < 0.06
         above = steak + np.where(level, -0.05, 0.1) * (0, 0, 1)
-        goal = np.where(held[:, None], hand + numbers(env, state, "end_1") - steak + (0, 0, 0.03), above)
+        way = numbers(env, state, "end_1") - steak
+        over_all = np.linalg.norm(way[:, :2], axis=1, keepdims=True) > 0.05  # pans stand between
+        goal = np.where(held[:, None], hand + way + np.where(over_all, 0.2, 0.03) * (0, 0, 1), above)
         action = np.zeros((2, 6), np.float32)
         action[:, :3] = np.clip((goal - hand) / 0.05, -1, 1)
         state = env.step(state, action)

@@ -40,6 +40,7 @@ def test_rates_have_intervals_and_no_episode_has_none():
     assert AxisResult("lights", [], []).as_dict()["success_rate"] is None
 
 
+@pytest.mark.slow
 def test_what_was_played_before_a_server_failed_is_kept(cooking_meat):
     calls = []
 

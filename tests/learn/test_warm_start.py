@@ -52,6 +52,7 @@ def test_an_actor_with_a_memory_first_does_what_the_policy_does(policy):
     assert int(begun.updates) > 0, "it acts at once"
 
 
+@pytest.mark.slow
 def test_other_networks_and_files_without_scales_are_refused(policy):
     _, _, loaded = policy
     others = {"actor_layers": (16,)}, {"action_bins": 0}, {"actor_layers": (32, 32)}

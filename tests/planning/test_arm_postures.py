@@ -57,6 +57,7 @@ def follower(body: ArmBody, at, quat, monkeypatch):
     return found
 
 
+@pytest.mark.slow
 def test_a_hand_needs_room_where_its_arm_brings_it(body, monkeypatch):
     """Inverse kinematics bring a hand off the straight line to a point near the robot's base."""
     hand, far = np.array([[0.0, 0.0, 0.0, 0.1]]), np.full(3, 9.0)

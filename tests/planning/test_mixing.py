@@ -29,6 +29,7 @@ def test_ingredients_are_poured_together_and_stirred(goal):
     assert steps[-2:] == ["grasp spoon_0", "mix bowl_0 spoon_0 seawater"]
 
 
+@pytest.mark.slow
 def test_what_is_there_already_is_only_stirred():
     assert planned(GOAL, TOGETHER) == ["grasp spoon_0", "mix bowl_0 spoon_0 seawater"]
     assert planned("stir the bowl with the spoon", TOGETHER)[-1] == "mix bowl_0 spoon_0 seawater"

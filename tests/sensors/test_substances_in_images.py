@@ -69,6 +69,7 @@ def test_a_level_is_horizontal_however_its_container_is_turned():
         assert axes.T @ axes == pytest.approx(np.eye(3), abs=1e-5) and np.linalg.det(axes) > 0
 
 
+@pytest.mark.slow
 def test_spots_are_the_points_that_are_covered():
     states = coat.set_covered(MODEL, initial_states(MODEL, 1), HOME.index["sponge"], "mud", True)
     row = MODEL.substances.row[HOME.index["sponge"]]
@@ -169,6 +170,7 @@ def test_images_of_both_renderers_show_the_level_of_a_glass(folder):
     assert POURED_JUG[0] < 0.15 - POURED_GLASS[0]  # the jug does not hide the glass
 
 
+@pytest.mark.slow
 def test_images_of_both_renderers_show_steam_over_hot_water(folder):
     middle = (SIDE // 2, SIDE // 2)
     found = [[_images(folder, name, 0.24, celsius) for celsius in (23.0, 80.0)] for name in ("native", "warp")]

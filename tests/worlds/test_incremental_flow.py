@@ -29,6 +29,7 @@ SEEN = [0] * 3 + [1] * 6 + [2] * 5 + [3] * 5 + [0] * 4 + [3] * 3
 FLOOR, SOAP = HOME.index["floor"], "liquid_soap"
 
 
+@pytest.mark.slow
 def test_flow_is_that_of_the_rules_without_whole_steps(monkeypatch):
     model = HOME.model()
     rules = Rules(model, compile_expression(model, "(contains glass water)"))

@@ -85,6 +85,7 @@ def test_an_actor_is_wrong_by_as_much_as_what_it_remembers():
     np.testing.assert_allclose(found["knife"].move, np.where(near[:, None], moved.apply(off[0]) - slip, 0), atol=1e-5)
 
 
+@pytest.mark.slow
 def test_who_is_far_off_is_told_the_truth_and_who_sees_it_now_believes_that():
     hidden, recall, scales = setting()
     place, still, rolls = np.zeros((WORLDS, 3)), Rotation.identity(WORLDS), np.array([0.0, 0.3, 0.0])
