@@ -3,7 +3,7 @@
 A pose is a point of the object's surface, the direction of the fingers along it, and that of the palm onto it. Rays go
 from many sides towards the centre of mass, and towards the middles of pieces where they miss.
 
-Axes: N candidates, S spheres of a hand, K pieces.
+Axes: N candidates, S spheres of a hand, K pieces, C corners of a gripper.
 """
 
 from __future__ import annotations
@@ -324,6 +324,16 @@ def _under_fingers(
     return which, found, swept[which]
 
 
+def _hands_at(
+    body: HandedBody,
+    points: Float[np.ndarray, "N 3"],
+    fingers: Float[np.ndarray, "N 3"],
+    palms: Float[np.ndarray, "N 3"],
+) -> Float[np.ndarray, "N C 3"]:
+    """Corners of open grippers at some poses, m, world frame."""
+    return np.stack([body.hand_corners(f, p) for f, p in zip(fingers, palms, strict=True)]) + points[:, None]
+
+
 def _fingers_have_room(
     body: HandedBody,
     obstacles: Obstacles,
@@ -334,7 +344,7 @@ def _fingers_have_room(
     """Whether open grippers meet nothing but the object at some poses; other hands do."""
     if not len(points) or body.opening is None:
         return np.ones(len(points), bool)
-    corners = np.stack([body.hand_corners(f, p) for f, p in zip(fingers, palms, strict=True)]) + points[:, None]
+    corners = _hands_at(body, points, fingers, palms)
     distance = obstacles.distance(corners)
     return np.all(distance > -GRAZE, axis=1)
 
@@ -351,7 +361,7 @@ def _passes(
     room = np.ones(len(points), bool)
     if not len(points) or body.opening is None:
         return room
-    corners = np.stack([body.hand_corners(f, p) for f, p in zip(fingers, palms, strict=True)]) + points[:, None]
+    corners = _hands_at(body, points, fingers, palms)
     for away in PASSING:
         left = np.flatnonzero(room)
         room[left] = np.all(obstacles.distance(corners[left] - away * palms[left, None]) > -CATCHES, axis=1)
