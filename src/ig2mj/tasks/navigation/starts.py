@@ -8,13 +8,14 @@ Axes: P rows.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Sequence
 
 import jax
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine
@@ -48,6 +49,9 @@ TRIES = 100
 
 YAWS = 4
 """Directions in which a robot is tried in every cell; it can stand where it can in one of them."""
+
+BITS = 15
+"""Bits of `contype` and `conaffinity` that models use at most."""
 
 ROBOT_SEPARATION = 0.8
 """m between robots at the start, and from loose objects to the robot."""
@@ -195,9 +199,9 @@ class Places:
         self.scene, tables, model = scene, scene.tables, scene.model
         joints = [int(model.body_jntadr[b]) for b in tables.agent_body]
         self.address = [int(model.jnt_qposadr[j]) for j in joints]
-        self._data, self._start = mujoco.MjData(model), np.array(qpos, float)
         agent = tables.body_agent[model.geom_bodyid]
-        self._agent = agent
+        self._agent, self._apart = agent, _apart(model, tables.body_agent >= 0)
+        self._data, self._start = mujoco.MjData(self._apart), np.array(qpos, float)
         ground = np.isin(np.array(tables.object_categories), GROUND)
         self._ground = (tables.geom_object >= 0) & ground[tables.geom_object]
         self._away = np.array([1000.0, 1000.0, 0.0])
@@ -217,7 +221,7 @@ class Places:
 
     def stands(self, number: int, pose: tuple[float, float, float]) -> bool:
         """Whether a robot touches nothing but the ground there."""
-        model, data = self.scene.model, self._data
+        model, data = self._apart, self._data
         at = self.address[number]
         data.qpos[at : at + 7] = self.free_joint(number, pose)
         mujoco.mj_kinematics(model, data)
@@ -258,6 +262,22 @@ class Places:
             return FloorMap.of_cells(free, resolution, near)
         except ValueError:
             raise EngineError(f"there is no free floor for the robot in '{self.scene.name}'") from None
+
+
+def _apart(model: mujoco.MjModel, robots: Bool[np.ndarray, "b"]) -> mujoco.MjModel:
+    """A model in which bodies meet robots only: contacts within the household would take most of the time of looking
+    where a robot stands.
+
+    MuJoCo looks for contacts of two geoms if a bit of `contype` of one is in `conaffinity` of the other. Types of
+    robots and affinities of the household stay in the low bits; the others are moved to the high ones.
+    """
+    found = copy.copy(model)
+    for of, robot in (("geom", robots[model.geom_bodyid]), ("body", robots)):
+        types, affinities = getattr(found, f"{of}_contype"), getattr(found, f"{of}_conaffinity")
+        assert ((types | affinities) >> BITS == 0).all()
+        types[~robot] <<= BITS
+        affinities[robot] <<= BITS
+    return found
 
 
 class _Households:
