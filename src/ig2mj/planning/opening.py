@@ -93,9 +93,10 @@ moves for one primitive."""
 SLIDES = (0.3, 0.15)
 """Shares of its range by which a hand that floats moves what slides, where it does not reach all of the way at once."""
 
-STANCES, WAYS, ARM_WAYS = 20, 6, 12
-"""Stances for each grip, and ways of a hand that are looked for, at most: of one that floats with each grip, and of one
-on an arm with one kind of grip, of those at whose beginning the arm has a posture."""
+STANCES, MOST_STANCES, WAYS, ARM_WAYS = 20, 80, 6, 12
+"""Stances for each grip, those among which they are looked for where not all will do, and ways of a hand that are
+looked for, at most: of one that floats with each grip, and of one on an arm with one kind of grip, of those at whose
+beginning the arm has a posture."""
 
 
 def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
@@ -235,15 +236,22 @@ def _progress(joint: OpenableJoint, now: Mapping[str, float], value: bool) -> fl
 
 
 def move_joint(
-    world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int = 0, to: float = OPEN_TO
+    world: PlannedWorld,
+    joint: OpenableJoint,
+    hand: int,
+    value: bool,
+    tried: int = 0,
+    to: float = OPEN_TO,
+    stands: Callable[[Stance], bool] = lambda stance: True,
 ) -> Generator[Program, str, tuple[str, str]]:
     """Opens or closes one door, drawer or lid as far as one motion of a hand does; returns why it did not come there,
     as a reason and in words, or "" twice.
 
     Args:
       tried: ways that have failed, which are left out. to: share of its range to which it is opened.
+      stands: where the robot may stand.
     """
-    found = _plan(world, joint, hand, value, tried, to)
+    found = _plan(world, joint, hand, value, tried, to, stands)
     if found is None:
         return "no_base", f"no free floor from which a hand can move {joint.name}"
     if reason := (yield from go(world, found.stance)):
@@ -325,7 +333,13 @@ def _is_held(world: PlannedWorld, joint: OpenableJoint) -> bool:
 
 
 def _plan(
-    world: PlannedWorld, joint: OpenableJoint, hand: int, value: bool, tried: int, to: float = OPEN_TO
+    world: PlannedWorld,
+    joint: OpenableJoint,
+    hand: int,
+    value: bool,
+    tried: int,
+    to: float,
+    stands: Callable[[Stance], bool],
 ) -> _JointPlan | None:
     floor, obstacles = world.floor(), world.obstacles()
     passed, ways, floats = 0, _ways(world, joint, value, to), world.body.opening is None
@@ -345,7 +359,8 @@ def _plan(
             first, normal = places[0]
             upright = grips is not joint.edges and float(np.linalg.norm(normal[:2])) > UPRIGHT
             middle, face = places[len(places) // 2][0], (first, normal) if upright else None
-            for stance in stances(world, hand, middle, floor, AWAY, most=STANCES, before=face):
+            proposed = stances(world, hand, middle, floor, AWAY, most=MOST_STANCES, before=face)
+            for stance in itertools.islice(filter(stands, proposed), STANCES):
                 if np.linalg.norm(sweep - np.array(stance.xy), axis=1).min() < STAND_OFF:
                     continue
                 stance = reaching_all(world, hand, stance, np.array([p for p, _ in places]), obstacles)
