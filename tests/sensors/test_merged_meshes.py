@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 
 from ig2mj import load_scene
+from ig2mj.agents import Humanoid
 from ig2mj.engine.warp.engine import WarpEngine
+from ig2mj.looks.visual import COSTUMES
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.sensors.merged_meshes import MESH, alpha, mergeable, rigid_parts, tables_of
 from ig2mj.sensors.render_model import make_render_model
+from ig2mj.sensors.triangle_trees import trees_of
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 
@@ -61,6 +64,20 @@ def test_every_visible_mesh_is_in_one_part_and_what_never_moves_is_the_first(sce
     still = [geom for geom in merged if scene.model.body_weldid[bodies[geom]] == 0]
     assert sorted(parts[0].geoms) == sorted(still) and len(still) > 10
     assert len(parts) < len(set(merged) - set(still)), "a body's meshes are one"
+
+
+def test_what_robots_wear_is_parts_that_move_by_themselves_before_the_garden():
+    scene = load_scene("small_home", [Humanoid()])
+    host = make_render_model(scene, [], looks="day")
+    parts = rigid_parts(host, scene.model, VISIBLE_GROUPS)
+    seen = np.isin(host.geom_group, VISIBLE_GROUPS) & (host.geom_type == MESH) & (alpha(host) > 0)
+    worn = [int(g) for g in np.flatnonzero(seen) if host.body(host.geom_bodyid[g]).name == COSTUMES]
+    assert len(worn) >= 5
+    assert [part.geom for part in parts if len(part.geoms) == 1 and part.geom in worn] == worn
+    assert sorted(geom for part in parts for geom in part.geoms) == np.flatnonzero(seen).tolist()
+    assert tables_of(host, parts).garden
+    trees = trees_of([part.vertices[part.faces] for part in parts])
+    assert all(np.isfinite(tree[1:, :3]).all() for tree in trees)
 
 
 def test_a_triangle_of_a_part_lies_where_its_geom_has_it(host, parts):

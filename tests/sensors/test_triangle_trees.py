@@ -145,6 +145,16 @@ def test_triangles_without_area_are_in_no_leaf_and_faces_keep_their_numbers():
     assert sorted(words[words[0, 1] :].ravel()[: len(nodes(tree)[1])]) == list(range(1, 20, 2))
 
 
+def test_triangles_too_thin_to_have_a_map_are_in_no_leaf():
+    """Two nearly parallel edges: what is between them is less than double precision tells."""
+    corners = soup(6, 4).astype(np.float64)
+    corners[1] = [[1.0, 2.0, 3.0], [1.1, 2.2, 3.3], [1.3, 2.6, 3.9 + 1e-16]]
+    corners[3] = corners[3, :1] + 1e-9 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    tree = trees_of([corners])[0]
+    words = tree.view(np.int32)
+    assert sorted(words[words[0, 1] :].ravel()[: len(nodes(tree)[1])]) == [0, 2, 4, 5]
+
+
 def test_a_tree_is_no_deeper_than_a_ray_remembers(monkeypatch):
     """Triangles of nine magnitudes side by side: the heuristic splits off the largest ones."""
     sizes = 10.0 ** -np.linspace(0.0, 9.0, 300)

@@ -68,18 +68,20 @@ def rigid_parts(
     data = mujoco.MjData(host)
     mujoco.mj_forward(host, data)
     seen = np.isin(host.geom_group, list(groups)) & (host.geom_type == MESH) & (alpha(host) > 0)
+    around = host.nbody + host.ngeom
     by_body: dict[int, list[int]] = {}
     for geom in np.flatnonzero(seen):
         if geom >= scene.ngeom and host.body(host.geom_bodyid[geom]).name == COSTUMES:
-            continue  # moves by itself
+            by_body[host.nbody + int(geom)] = [int(geom)]  # moves by itself
+            continue
         if geom >= scene.ngeom and host.geom(geom).name.startswith(f"ig2mj/{OUTSIDE}"):
-            by_body.setdefault(host.nbody, []).append(int(geom))  # few rays leave the house: a tree of its own
+            by_body.setdefault(around, []).append(int(geom))  # few rays leave the house: a tree of its own
             continue
         body = int(scene.geom_bodyid[geom]) if geom < scene.ngeom else 0  # what else looks add stands still
         welded = int(scene.body_weldid[body])
         mocap = int(scene.body_mocapid[scene.body_rootid[body]]) >= 0
         by_body.setdefault(welded if welded or not mocap else body, []).append(int(geom))
-    return [_part(host, data, geoms, covered, 0 < body < host.nbody) for body, geoms in sorted(by_body.items())]
+    return [_part(host, data, geoms, covered, 0 < body < around) for body, geoms in sorted(by_body.items())]
 
 
 def robot_geoms(host: mujoco.MjModel, body_agent: Int[np.ndarray, "B"]) -> Bool[np.ndarray, "G"]:

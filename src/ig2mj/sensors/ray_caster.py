@@ -58,6 +58,10 @@ def use_merged(
       changes: of the kernel (`limit_light`).
     """
     assert host.nflex == 0, "flexes' arrays carry the tables"
+    for context in contexts:
+        shown = context.enabled_geom_ids.numpy()
+        known = tables.data_id[shown] >= host.nmesh
+        assert known[host.geom_type[shown] == MESH].all(), "the kernel has no code for other meshes"
 
     def make_cast_ray(geom_ray_types: tuple[int, ...], first_hit: bool = False) -> wp.Function:
         return _cast_ray(geom_ray_types, first_hit, host.ngeom, host.nmesh, tables, bool(robots.any()))
@@ -190,24 +194,19 @@ def _cast_ray(
             if wp.static(MESH in kinds):
                 if kind == wp.static(MESH):
                     which = geom_dataid[worldid % geom_dataid.shape[0], geom]
-                    if which < wp.static(nmesh):
-                        d, n, u, v, f, merged = ray.ray_mesh_with_bvh(
-                            mesh_bvh_id, which, pos, mat, start, direction, reach, behind
-                        )
-                    else:
-                        inverse = wp.transpose(mat)
-                        met = first_triangle(
-                            mesh_bvh_id[which], inverse @ (start - pos), inverse @ direction, reach, behind
-                        )
-                        d = met[0]
-                        if d >= 0.0:
-                            u = met[1]
-                            v = met[2]
-                            n = mat @ wp.vec3(met[4], met[5], met[6])
-                            f = int(met[3])
-                            geom = face_geom[tables[wp.static(2 * ngeom - nmesh) + which] + f]
-                            f = f - tables[geom]
-                            merged = tables[wp.static(ngeom) + geom]
+                    inverse = wp.transpose(mat)
+                    met = first_triangle(
+                        mesh_bvh_id[which], inverse @ (start - pos), inverse @ direction, reach, behind
+                    )
+                    d = met[0]
+                    if d >= 0.0:
+                        u = met[1]
+                        v = met[2]
+                        n = mat @ wp.vec3(met[4], met[5], met[6])
+                        f = int(met[3])
+                        geom = face_geom[tables[wp.static(2 * ngeom - nmesh) + which] + f]
+                        f = f - tables[geom]
+                        merged = tables[wp.static(ngeom) + geom]
             if wp.static(primitives):
                 if kind != wp.static(MESH):
                     size = geom_size[worldid % geom_size.shape[0], geom]

@@ -45,8 +45,9 @@ GROWN = 5e-6
 """m by which triangles and boxes are larger on each side than they are: more than what rays are rounded by in a home,
 so that none passes between two triangles with an edge in common."""
 
-FLAT = 1e-20
-"""m2: triangles with less area are left out."""
+FLAT, SLENDER = 1e-14, 1e-12
+"""m2 and rad: triangles with less area, or less than this between two edges, are left out. They are thinner than what
+their neighbours are grown by, and the map of a thinner one is singular."""
 
 
 @dataclasses.dataclass
@@ -75,8 +76,10 @@ def trees_of(meshes: Sequence[Float[np.ndarray, "_ 3 3"]]) -> list[Float[np.ndar
     corners = np.concatenate([np.zeros((0, 3, 3)), *meshes]).astype(np.float64)
     counts = np.array([len(mesh) for mesh in meshes], int)
     mesh, first = np.repeat(np.arange(len(meshes)), counts), np.cumsum(counts) - counts
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    solid = np.flatnonzero(np.linalg.norm(normal, axis=1) > 2.0 * FLAT)
+    edges = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(*edges)
+    spanned = SLENDER * np.linalg.norm(edges[0], axis=1) * np.linalg.norm(edges[1], axis=1)
+    solid = np.flatnonzero(np.linalg.norm(normal, axis=1) > np.maximum(spanned, 2.0 * FLAT))
     corners, normal, mesh = corners[solid], normal[solid], mesh[solid]
     order, levels = _split_all(corners, mesh)
     maps, faces, mesh = _maps(corners, normal)[order], (solid - first[mesh])[order], mesh[order]
