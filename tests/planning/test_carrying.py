@@ -15,12 +15,18 @@ class _Corridor(Obstacles):
     def __init__(self, opens: bool):
         self._end = 2.0 if opens else np.inf
 
+    def within(self, low, high):
+        return self
+
+    def clear_at(self, spheres, points, together=64):
+        return np.array([self.clear(spheres + np.array([*point, 0.0])) for point in points], bool)
+
     def clear(self, spheres):
         x, y, _, radius = spheres.T
         return not ((x < self._end) & (np.abs(y) + radius > 0.5)).any()
 
 
-class _Pole(Obstacles):
+class _Pole(_Corridor):
     """A pole, 2 cm thick, 1.1 m from a place on the x axis, between two of the headings there; nothing else."""
 
     def __init__(self, at: float, between: float):
@@ -88,7 +94,7 @@ def test_what_is_held_is_not_turned_through_what_is_thinner_than_a_turn_by_one_h
     assert yaws.min() < -np.pi  # the other way around
 
 
-class _Chair(Obstacles):
+class _Chair(_Corridor):
     """Across all of the way, 1.1 m high."""
 
     def __init__(self):

@@ -11,9 +11,10 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ig2mj.geometry.host_rotations import about_vertical
+from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.moves import TOUCHES
 from ig2mj.planning.world import HIGHEST, PlannedWorld, Stance
 
@@ -26,6 +27,9 @@ turn by one heading would take it past the back of a chair."""
 
 TURN = 0.15
 """m of way that a turn by one heading counts as."""
+
+DIGITS = 6
+"""Decimals of m to which lengths of ways are compared."""
 
 
 def carried_way(
@@ -56,52 +60,34 @@ def _carried_way(
     (here, now), last = world.base, len(places) - 1
     held = _held(world) * (1.0, 1.0, 1.0, share) + (0.0, 0.0, up, 0.0)
     obstacles = world.obstacles([n for n in world.held if n and not world.domain.fixed(n)])
+    room = _Room(obstacles, held, places, now, fine)
     step = 2 * np.pi / HEADINGS
     goal = last, round((yaw - now) / step) % HEADINGS
-    known: dict[tuple[int, int], bool] = {(0, 0): True}
-    passed = dict[tuple[tuple[int, int], tuple[int, int]], bool]()
-    reach = float(np.linalg.norm(held[:, :2], axis=1).max(initial=0.0))
-    turning = max(1, int(np.ceil(step * reach / BETWEEN)))
+    if goal != (0, 0) and not room.clear(goal):
+        return None
 
-    def at_pose(xy: np.ndarray, heading: float) -> np.ndarray:
-        there = held[:, :3] @ about_vertical(now + step * heading).T + np.array([*xy, 0.0])
-        return np.concatenate([there, held[:, 3:]], axis=1)
-
-    def clear(state: tuple[int, int]) -> bool:
-        if state not in known:
-            known[state] = obstacles.clear(at_pose(places[state[0]], float(state[1])))
-        return known[state]
-
-    def passes(state: tuple[int, int], other: tuple[int, int]) -> bool:
-        """Whether what is held keeps clear between two neighbouring states; where the robot is now, it may touch
-        something."""
-        if other == (0, 0):
-            return passes(other, state)
-        key = (state, other) if state < other or state == (0, 0) else (other, state)
-        if key not in passed:
-            state, other = key
-            (a, b), side = (state[0], other[0]), (other[1] - state[1] + 1) % HEADINGS - 1
-            count = turning if a == b else max(1, int(np.ceil(np.linalg.norm(places[b] - places[a]) / BETWEEN)))
-            shares = np.arange(1 if state != (0, 0) else max(1, count // 2), count) / count
-            poses = [at_pose(places[a] + t * (places[b] - places[a]), state[1] + t * side) for t in shares]
-            passed[key] = not poses or obstacles.clear(np.concatenate(poses))
-        return passed[key]
+    def left(state: tuple[int, int]) -> float:
+        """m that a way is at least as long as from a state, turns included."""
+        turns = (goal[1] - state[1]) % HEADINGS
+        return APART * (last - state[0]) + TURN * min(turns, HEADINGS - turns)
 
     costs, before = {(0, 0): 0.0}, dict[tuple[int, int], tuple[int, int]]()
-    queue = [(0.0, (0, 0))]
+    queue = [(left((0, 0)), 0, 0.0, 0)]
     while queue:
-        cost, state = heapq.heappop(queue)
+        _, behind, cost, heading = heapq.heappop(queue)  # of ways that promise as much, the one that turns last
+        at = -behind
+        state = at, heading
         if state == goal:
             break
         if cost > costs[state]:
             continue
-        at, heading = state
         turns = [((at, (heading + side) % HEADINGS), TURN) for side in (1, -1)]
         moves = [((at + side, heading), APART) for side in (1, -1) if 0 <= at + side <= last]
         for other, extra in (*moves, *turns):
-            if cost + extra < costs.get(other, np.inf) and clear(other) and (not fine or passes(state, other)):
-                costs[other], before[other] = cost + extra, state
-                heapq.heappush(queue, (cost + extra, other))
+            whole = round(cost + extra, DIGITS)
+            if whole < costs.get(other, np.inf) and room.clear(other) and room.passes(state, other):
+                costs[other], before[other] = whole, state
+                heapq.heappush(queue, (round(whole + left(other), DIGITS), -other[0], whole, other[1]))
     if goal not in costs:
         return None
     states = [goal]
@@ -109,6 +95,99 @@ def _carried_way(
         states.append(before[states[-1]])
     found = [Stance((float(places[at][0]), float(places[at][1])), now + step * heading) for at, heading in states[::-1]]
     return _merged([*found[1:], Stance(found[-1].xy, yaw)], Stance((float(here[0]), float(here[1])), now))
+
+
+class _Room:
+    """Where what is held keeps clear: at places of a way in each heading, and between neighbouring ones. All places are
+    looked at together, in a heading when it is first asked for.
+
+    A state is the number of the place, and of the heading.
+    """
+
+    def __init__(
+        self,
+        obstacles: Obstacles,
+        held: Float[np.ndarray, "n 4"],
+        places: Float[np.ndarray, "M 2"],
+        now: float,
+        fine: bool,
+    ):
+        """
+        Args:
+          held: spheres about the base, as if it faced along x. now: rad, of heading 0. fine: what is held keeps clear
+            between two headings, too.
+        """
+        reach = float(np.linalg.norm(held[:, :2], axis=1).max(initial=0.0))
+        self._held, self._now, self._fine = held, now, fine
+        self._places = np.column_stack([places, np.zeros(len(places))])
+        wide, height = float(held[:, 3].max(initial=0.0)), held[:, 2]
+        low, high = self._places.min(0) - reach - wide, self._places.max(0) + reach + wide
+        low[2], high[2] = height.min(initial=np.inf) - wide, height.max(initial=-np.inf) + wide
+        self._obstacles = obstacles.within(low, high)
+        self._step = 2 * np.pi / HEADINGS
+        self._turning = max(1, int(np.ceil(self._step * reach / BETWEEN)))
+        self._at = dict[int, np.ndarray]()
+        self._turns = dict[int, np.ndarray]()
+        self._moves = dict[int, np.ndarray]()
+
+    def clear(self, state: tuple[int, int]) -> bool:
+        """Whether what is held keeps clear; where the robot is now, it may touch something."""
+        place, heading = state
+        if heading not in self._at:
+            self._at[heading] = self._clear_at(float(heading), self._places)
+            if heading == 0:
+                self._at[heading][0] = True
+        return bool(self._at[heading][place])
+
+    def passes(self, state: tuple[int, int], other: tuple[int, int]) -> bool:
+        """Whether what is held keeps clear between two neighbouring states; where the robot is now, it may touch
+        something."""
+        if not self._fine:
+            return True
+        if other == (0, 0):
+            state, other = other, state
+        place, heading = state
+        side = (other[1] - heading + 1) % HEADINGS - 1
+        if state == (0, 0):
+            ahead = self._places[other[0]] - self._places[0]
+            count = self._turning if side else _count(ahead)
+            shares = np.arange(max(1, count // 2), count) / count
+            return all(self._clear_at(float(t) * side, self._places[:1] + t * ahead)[0] for t in shares)
+        if side:
+            return bool(self._turns_from(heading if side > 0 else other[1])[place])
+        return bool(self._moves_in(heading)[min(place, other[0])])
+
+    def _turns_from(self, heading: int) -> Bool[np.ndarray, "M"]:
+        """At which places there is room between a heading and the next one."""
+        if heading not in self._turns:
+            found = np.ones(len(self._places), bool)
+            for t in np.arange(1, self._turning) / self._turning:
+                rows = np.flatnonzero(found)
+                found[rows] = self._clear_at(heading + float(t), self._places[rows])
+            self._turns[heading] = found
+        return self._turns[heading]
+
+    def _moves_in(self, heading: int) -> Bool[np.ndarray, "n"]:
+        """Between which places and the next ones there is room in a heading."""
+        if heading not in self._moves:
+            ahead = np.diff(self._places, axis=0)
+            counts = np.array([_count(way) for way in ahead], int)
+            found = np.ones(len(ahead), bool)
+            for k in range(1, int(counts.max(initial=1))):
+                rows = np.flatnonzero(found & (counts > k))
+                share = (k / counts[rows])[:, None]
+                found[rows] = self._clear_at(float(heading), self._places[rows] + share * ahead[rows])
+            self._moves[heading] = found
+        return self._moves[heading]
+
+    def _clear_at(self, heading: float, points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, "m"]:
+        turned = self._held[:, :3] @ about_vertical(self._now + self._step * heading).T
+        return self._obstacles.clear_at(np.column_stack([turned, self._held[:, 3]]), points)
+
+
+def _count(ahead: Float[np.ndarray, "3"]) -> int:
+    """Parts that a move is looked at in."""
+    return max(1, int(np.ceil(np.linalg.norm(ahead) / BETWEEN)))
 
 
 def _held(world: PlannedWorld) -> Float[np.ndarray, "n 4"]:

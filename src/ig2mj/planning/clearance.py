@@ -72,13 +72,18 @@ def _corners(tables: SceneTables) -> Float[np.ndarray, "K V 3"]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Placed:
-    """Pieces of one world: half-spaces and boxes, world frame; `pose` of each body when they were placed."""
+    """Pieces of one world: half-spaces and boxes, world frame; `pose` of each body when they were placed.
+
+    Attributes:
+      bounds: `low` and -`high` of each, one row for each axis: boxes are compared most often.
+    """
 
     pose: Float[np.ndarray, "B 7"]
     normal: Float[np.ndarray, "K N 3"]
     offset: Float[np.ndarray, "K N"]
     low: Float[np.ndarray, "K 3"]
     high: Float[np.ndarray, "K 3"]
+    bounds: Float[np.ndarray, "6 K"]
 
 
 class PlacedPieces:
@@ -109,7 +114,8 @@ class PlacedPieces:
             for whole, part in zip(kept, new, strict=True):
                 whole[moved] = part
             new = kept
-        self._of_world[world] = placed = _Placed(pose, *new)
+        bounds = np.ascontiguousarray(np.concatenate([new[2], -new[3]], axis=1).T)
+        self._of_world[world] = placed = _Placed(pose, *new, bounds)
         return placed
 
 
@@ -134,15 +140,42 @@ class Obstacles:
         self._body: tuple[float, ...] | None = None
         self._carried = np.zeros((0, 4))
         self._normal, self._offset, self._low, self._high = placed.normal, placed.offset, placed.low, placed.high
-        self._more = _has_more(scene.tables)
+        self._bounds, self._more = placed.bounds, _has_more(scene.tables)
+
+    def _near(self, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"]) -> Int[np.ndarray, "n"]:
+        """Numbers of pieces whose boxes meet a box."""
+        meets = (self._bounds <= np.concatenate([high, -low])[:, None]).all(0)
+        return np.flatnonzero(meets & self._keep)
+
+    def _carried_near(self, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"]) -> Float[np.ndarray, "n 4"]:
+        """Spheres of what other hands hold whose boxes meet a box."""
+        if not len(self._carried):
+            return self._carried
+        centre, radius = self._carried[:, :3], self._carried[:, 3:]
+        return self._carried[((centre - radius <= high) & (centre + radius >= low)).all(1)]
+
+    def _pairs(
+        self, boxes: Float[np.ndarray, "6 N"], near: Int[np.ndarray, "n"]
+    ) -> tuple[Int[np.ndarray, "m"], Int[np.ndarray, "m"]]:
+        """Boxes (rows as those of `_Placed.bounds`) and pieces, of some, that overlap."""
+        limit = -self._bounds[:, near][[3, 4, 5, 0, 1, 2]]
+        box, piece = np.nonzero((boxes[:, :, None] < limit[:, None]).all(0))
+        return box, near[piece]
+
+    def within(self, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"]) -> Obstacles:
+        """Those pieces alone whose boxes meet a box, m: for many questions about the same place."""
+        other, near = copy.copy(self), self._near(low, high)
+        other.objects, other._bodies, other._keep = self.objects[near], self._bodies[near], self._keep[near]
+        other._normal, other._offset, other._more = self._normal[near], self._offset[near], self._more[near]
+        other._low, other._high, other._bounds = self._low[near], self._high[near], self._bounds[:, near]
+        return other
 
     def distance(self, points: Float[np.ndarray, "*M 3"]) -> Float[np.ndarray, "*M"]:
         """m from points to the nearest piece, at most `FAR`; negative inside."""
         if not points.size:
             return np.zeros(points.shape[:-1])
         every = points.reshape(-1, 3)
-        low, high = every.min(0) - FAR, every.max(0) + FAR
-        near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
+        near = self._near(every.min(0) - FAR, every.max(0) + FAR)
         if not len(near):
             return np.full(points.shape[:-1], FAR)
         found = np.full(len(every), FAR)
@@ -217,36 +250,41 @@ class Obstacles:
             below = _where_negative(centre[held, 2] - high, ahead[2])
             if meets(np.maximum(first, below[0]), np.minimum(last, below[1])).any():
                 return False
-        if len(self._carried):
-            offset = centre[:, None] - self._carried[:, :3]
-            if meets(*_within(offset, ahead, radius[:, None] + self._carried[:, 3])).any():
-                return False
-        bottom, top = centre - radius[:, None], centre + radius[:, None]
         ends = np.outer((along[0], along[-1]), ahead)
-        low, high = bottom.min(0) + ends.min(0), top.max(0) + ends.max(0)
-        near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
+        bottom, top = centre - radius[:, None], centre + radius[:, None]
+        swept = np.ascontiguousarray(np.concatenate([bottom + ends.min(0), -(top + ends.max(0))], axis=1).T)
+        corners = swept.min(1)
+        carried = self._carried_near(corners[:3], -corners[3:])
+        if len(carried):
+            offset = centre[:, None] - carried[:, :3]
+            if meets(*_within(offset, ahead, radius[:, None] + carried[:, 3])).any():
+                return False
+        near = self._near(corners[:3], -corners[3:])
         if not len(near):
             return True
-        first, last = np.full((len(centre), len(near)), -np.inf), np.full((len(centre), len(near)), np.inf)
+        sphere, piece = self._pairs(swept, near)
+        first, last = np.full(len(sphere), -np.inf), np.full(len(sphere), np.inf)
         for axis in range(3):  # where the boxes of spheres and pieces meet
-            enters, leaves = self._low[near, axis] - top[:, axis, None], self._high[near, axis] - bottom[:, axis, None]
+            enters, leaves = self._low[piece, axis] - top[sphere, axis], self._high[piece, axis] - bottom[sphere, axis]
             if abs(ahead[axis]) < LEVEL:
                 last[(enters >= 0.0) | (leaves <= 0.0)] = -np.inf
                 continue
             enters, leaves = (enters / ahead[axis], leaves / ahead[axis])[:: 1 if ahead[axis] > 0.0 else -1]
             first, last = np.maximum(first, enters), np.minimum(last, leaves)
-        sphere, piece = np.nonzero(meets(first, last))
+        some = meets(first, last)
+        first, last, sphere, piece = first[some], last[some], sphere[some], piece[some]
         for planes in (slice(FACES), slice(FACES, None)):
-            of = near[piece]
-            away = np.einsum("pni,pi->pn", self._normal[of, planes], centre[sphere]) - self._offset[of, planes]
-            begins, ends = _where_negative(away - radius[sphere, None], self._normal[of, planes] @ ahead)
-            begins = np.maximum(first[sphere, piece], begins.max(-1, initial=-np.inf))
-            ends = np.minimum(last[sphere, piece], ends.min(-1, initial=np.inf))
-            first[sphere, piece], last[sphere, piece] = begins, ends
-            inside = meets(begins, ends)
-            if inside.any() and (~self._more[of[inside]]).any():
+            if not len(sphere):
+                break
+            normal = self._normal[piece, planes]
+            away = np.einsum("pni,pi->pn", normal, centre[sphere]) - self._offset[piece, planes]
+            begins, ends = _where_negative(away - radius[sphere, None], normal @ ahead)
+            first = np.maximum(first, begins.max(-1, initial=-np.inf))
+            last = np.minimum(last, ends.min(-1, initial=np.inf))
+            inside = meets(first, last)
+            if inside.any() and (~self._more[piece[inside]]).any():
                 return False
-            sphere, piece = sphere[inside], piece[inside]
+            first, last, sphere, piece = first[inside], last[inside], sphere[inside], piece[inside]
         return not len(sphere)
 
     def _enters(self, centre: Float[np.ndarray, "N 3"], radius: Float[np.ndarray, "N"]) -> Bool[np.ndarray, "N"]:
@@ -258,28 +296,26 @@ class Obstacles:
             x, y, wide, high = self._body
             held = (radius < HELD) & (centre[:, 2] < high)
             bad |= held & (np.hypot(centre[:, 0] - x, centre[:, 1] - y) < wide + radius)
-        if len(self._carried):
-            apart = np.linalg.norm(centre[:, None] - self._carried[:, :3], axis=-1)
-            bad |= (apart < radius[:, None] + self._carried[:, 3]).any(1)
-        wide = radius[:, None]
-        low, high = (centre - wide).min(0), (centre + wide).max(0)
-        near = np.flatnonzero(self._keep & ((self._low <= high) & (self._high >= low)).all(1))
+        middle = np.ascontiguousarray(centre.T)
+        box = np.concatenate([middle - radius, -(middle + radius)])  # as `_Placed.bounds`
+        ends = box.min(1)
+        carried = self._carried_near(ends[:3], -ends[3:])
+        if len(carried):
+            apart = np.linalg.norm(centre[:, None] - carried[:, :3], axis=-1)
+            bad |= (apart < radius[:, None] + carried[:, 3]).any(1)
+        near = self._near(ends[:3], -ends[3:])
         if not len(near):
             return bad
-        meets = np.ones((len(centre), len(near)), bool)
-        for axis in range(3):
-            meets &= (centre[:, axis, None] - wide) < self._high[near, axis]
-            meets &= (centre[:, axis, None] + wide) > self._low[near, axis]
-        sphere, piece = np.nonzero(meets)
-        piece = near[piece]
+        sphere, piece = self._pairs(box, near)
         for planes in (slice(FACES), slice(FACES, None)):
+            if not len(sphere):
+                break
             away = np.einsum("pni,pi->pn", self._normal[piece, planes], centre[sphere]) - self._offset[piece, planes]
             inside = away.max(-1, initial=-1.0) < radius[sphere]
             sphere, piece = sphere[inside], piece[inside]
             more = self._more[piece]
-            bad[sphere[~more]] = True
-            last, sphere, piece = sphere, sphere[more], piece[more]
-        bad[last] = True
+            bad[sphere if planes.start else sphere[~more]] = True
+            sphere, piece = sphere[more], piece[more]
         return bad
 
     def entries(
