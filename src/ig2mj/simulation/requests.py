@@ -4,8 +4,8 @@ A request is *prepared* if what must hold first could be sampled and taken into 
 hold then: water does not stay in a glass that lies on its side. It *has a solution* if the rung that is measured
 carries it out, or the symbolic rung does from the same state (the sampler finds a state in which the primitive's
 condition holds) and hands could: what is grasped is of a category that hands take hold of and, in physics, some part
-of what is acted on, or of where it is placed, is within a hand's reach of floor that the robot could drive to if nothing
-loose stood there, whatever is in between.
+of what is acted on, or of where it is placed, is within a hand's reach of floor that the robot could drive to if
+nothing loose stood there, whatever is in between.
 """
 
 from __future__ import annotations
