@@ -27,7 +27,7 @@ from mujoco.mjx.third_party.mujoco_warp._src import bvh, ray
 from ig2mj.sensors.merged_meshes import MESH, Tables
 from ig2mj.sensors.render_model import NEAR
 from ig2mj.sensors.shading import limit_light
-from ig2mj.sensors.triangle_rays import first_triangle
+from ig2mj.sensors.triangle_rays import Hit, first_triangle
 from ig2mj.sensors.triangle_trees import trees_of
 
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)
@@ -98,6 +98,21 @@ def _marked(pictures: int) -> tuple[str, str]:
     return _FAR, _FAR.replace("max_cam_dist", f"wp.where(camid < {pictures}, max_cam_dist, -max_cam_dist)")
 
 
+@wp.func
+@no_type_check
+def _surface(
+    met: Hit, first: int, face_geom: wp.array[int], tables: wp.array[int], ngeom: int
+) -> tuple[int, float, wp.vec3, float, float, int, int]:
+    """What a ray has met, as upstream's kernel takes it; the normal in the mesh's frame.
+
+    Args:
+      first: of the mesh's faces, among those of all parts.
+    """
+    geom = face_geom[first + int(met[3])]
+    normal = wp.vec3(met[4], met[5], met[6])
+    return geom, met[0], normal, met[1], met[2], int(met[3]) - tables[geom], tables[ngeom + geom]
+
+
 @no_type_check
 def _cast_ray(
     kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, known: Tables, robots: bool
@@ -160,13 +175,7 @@ def _cast_ray(
         if wp.static(still):
             met = first_triangle(mesh_bvh_id[wp.static(nmesh)], origin, direction, dist, cull_backfaces)
             if met[0] >= 0.0:
-                dist = met[0]
-                bary_u = met[1]
-                bary_v = met[2]
-                normal = wp.vec3(met[4], met[5], met[6])
-                geom_id = face_geom[int(met[3])]
-                face = int(met[3]) - tables[geom_id]
-                mesh_id = tables[wp.static(ngeom) + geom_id]
+                geom_id, dist, normal, bary_u, bary_v, face, mesh_id = _surface(met, 0, face_geom, tables, ngeom)
                 if wp.static(first_hit):
                     return geom_id, dist, normal, bary_u, bary_v, face, mesh_id
 
@@ -198,15 +207,10 @@ def _cast_ray(
                     met = first_triangle(
                         mesh_bvh_id[which], inverse @ (start - pos), inverse @ direction, reach, behind
                     )
-                    d = met[0]
-                    if d >= 0.0:
-                        u = met[1]
-                        v = met[2]
-                        n = mat @ wp.vec3(met[4], met[5], met[6])
-                        f = int(met[3])
-                        geom = face_geom[tables[wp.static(2 * ngeom - nmesh) + which] + f]
-                        f = f - tables[geom]
-                        merged = tables[wp.static(ngeom) + geom]
+                    if met[0] >= 0.0:
+                        first = tables[wp.static(2 * ngeom - nmesh) + which]
+                        geom, d, n, u, v, f, merged = _surface(met, first, face_geom, tables, ngeom)
+                        n = mat @ n
             if wp.static(primitives):
                 if kind != wp.static(MESH):
                     size = geom_size[worldid % geom_size.shape[0], geom]
@@ -262,13 +266,9 @@ def _cast_ray(
             if not indoors:
                 met = first_triangle(mesh_bvh_id[wp.static(last)], origin, direction, dist, cull_backfaces)
                 if met[0] >= 0.0:
-                    dist = met[0]
-                    bary_u = met[1]
-                    bary_v = met[2]
-                    normal = wp.vec3(met[4], met[5], met[6])
-                    geom_id = face_geom[wp.static(last_face) + int(met[3])]
-                    face = int(met[3]) - tables[geom_id]
-                    mesh_id = tables[wp.static(ngeom) + geom_id]
+                    geom_id, dist, normal, bary_u, bary_v, face, mesh_id = _surface(
+                        met, last_face, face_geom, tables, ngeom
+                    )
         return geom_id, dist, normal, bary_u, bary_v, face, mesh_id
 
     return cast_ray
