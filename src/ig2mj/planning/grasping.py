@@ -306,7 +306,7 @@ def _plan(
         stance, pose = candidate
         spheres, goal, back = spheres_of(world, pose), pose.at(pose.before), entries(pose, stance.xy)
         follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles, stance)
-        rests, standing = world.resting(hand, stance), world.standing(obstacles, stance, hand)
+        rests, standing = world.resting(hand, stance), world.standing(obstacles, stance, hand, body=False)
         way = hand_path(standing, spheres, rests, goal, back, search=search, follows=follows)
         return goes_on(way, pose.at(0.0), follows, strays=search)
 

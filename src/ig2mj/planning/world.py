@@ -174,8 +174,12 @@ class PlannedWorld:
         others = set(range(len(self.domain.model.tables.object_names))) - {index}
         return self.planner.obstacles(self.view, others, self.world)
 
-    def standing(self, obstacles: Obstacles, stance: Stance, hand: int) -> Obstacles:
-        """The same with the robot's body, if it stood there, and what hands but one would hold there."""
+    def standing(self, obstacles: Obstacles, stance: Stance, hand: int, body: bool = True) -> Obstacles:
+        """The same with the robot's body, if it stood there, and what hands but one would hold there.
+
+        Args:
+          body: False for an empty hand, which passes through the body, however small its spheres are.
+        """
         here, yaw = self.base
         now = np.array([*here, self.stance.rise])
         then, turn = np.array([*stance.xy, stance.rise]), about_vertical(stance.yaw - yaw)
@@ -184,7 +188,7 @@ class PlannedWorld:
             for other, name in enumerate(self.held)
             if name and other != hand and name != self.held[hand] and not self.domain.fixed(name)
         ]
-        found = obstacles.about(stance.xy, *self.body.trunk)
+        found = obstacles.about(stance.xy, *self.body.trunk) if body else obstacles
         if not points:
             return found
         carried = np.concatenate(points)
