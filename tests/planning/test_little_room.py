@@ -104,6 +104,14 @@ def test_a_hand_almost_touches_walls_on_its_way_where_there_is_no_more_room(worl
     assert np.allclose(spheres[:, 3], grasps.AT_OBJECT * world.spheres(narrow[0].fingers, narrow[0].palm)[:, 3])
 
 
+@pytest.mark.parametrize("share", [1.0, grasps.AT_OBJECT])
+def test_an_empty_hand_begins_its_way_next_to_the_body_however_little_room_it_needs(world, share):
+    hand, stance = 0, world.stance
+    spheres = world.spheres(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0])) * (1.0, 1.0, 1.0, share)
+    obstacles = world.standing(world.obstacles(), stance, hand, body=False)
+    assert obstacles.clear(spheres + np.array([*world.resting(hand, stance), 0.0]))
+
+
 def test_the_body_turns_its_shoulder_to_what_is_hardly_in_reach(world):
     whole = world.floor()
     cell = whole.nearest(world.base[0], 0.2)

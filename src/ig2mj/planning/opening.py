@@ -338,8 +338,8 @@ def _plan(
     hand: int,
     value: bool,
     tried: int,
-    to: float,
-    stands: Callable[[Stance], bool],
+    to: float = OPEN_TO,
+    stands: Callable[[Stance], bool] = lambda stance: True,
 ) -> _JointPlan | None:
     floor, obstacles = world.floor(), world.obstacles()
     passed, ways, floats = 0, _ways(world, joint, value, to), world.body.opening is None
