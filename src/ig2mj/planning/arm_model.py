@@ -52,6 +52,10 @@ IDLE, NEARER, RADIUS = 30, 0.001, 0.3
 """Agent steps in which a hand comes no nearer to a point of a way, by so many m, after which it is given up; and m that
 a rad of turning counts as."""
 
+DIGITS = 6
+"""Of offset and turn of a hand: they are constants of compiled programs, which differ by rounding between places of the
+robot, and would be compiled for each of these."""
+
 UNFUSED = {"xla_disable_hlo_passes": "fusion"}
 """Options of XLA on the host, where fused operations compute what is before a joint again for each column of the
 Jacobian: inverse kinematics take 0.9 ms without fusion, and 2.5 ms with it."""
@@ -95,8 +99,8 @@ class ArmModel:
         at = turn.T @ (data.xpos[palm] + data.xmat[palm].reshape(3, 3) @ grip - data.xpos[base])
         quat = matrix_to_quat(turn.T @ data.xmat[palm].reshape(3, 3))
         tip, tip_quat, _ = (np.asarray(v, float)[0] for v in forward(self.chain, jnp.asarray(q[None], jnp.float32)))
-        self.offset = np.asarray(quat_rotate_inverse(tip_quat, at - tip), float)
-        self.turn = np.asarray(quat_multiply(quat_conjugate(tip_quat), quat), float)
+        offset, turn = quat_rotate_inverse(tip_quat, at - tip), quat_multiply(quat_conjugate(tip_quat), quat)
+        self.offset, self.turn = (np.round(np.asarray(v, float), DIGITS) + 0.0 for v in (offset, turn))
 
     def hand(self, q: Float[np.ndarray, "N J"]) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 4"]]:
         """Grasp point and orientation of the hand, in the base's frame."""
