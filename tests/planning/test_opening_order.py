@@ -1,5 +1,6 @@
 """Which doors and drawers of a container are moved, in which order, until there is a way for a hand."""
 
+import collections
 import dataclasses
 import types
 
@@ -58,6 +59,7 @@ def moved(monkeypatch):
             facts=facts,
             com=lambda name: com,
             body=types.SimpleNamespace(opening=None),
+            missed=collections.Counter(),
         )
 
     return container, noted

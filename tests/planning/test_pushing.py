@@ -1,5 +1,6 @@
 """Objects are brought into contact with others, or out of the way."""
 
+import collections
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,12 +9,19 @@ import pytest
 import ig2mj
 from ig2mj.agents.humanoid import Humanoid
 from ig2mj.planning import primitives, pushing
+from ig2mj.planning.moves import tries_left
 from ig2mj.planning.pushing import push_aside
 from ig2mj.planning.steps import Outcome, Step
 
 
+def test_a_gripper_tries_again_less_often_what_it_has_tried_in_vain():
+    assert [tries_left(8, missed, opening=0.1) for missed in (0, 3, 8, 20)] == [8, 5, 2, 2]
+    assert tries_left(4, 9, opening=None) == 4, "a palm has all of its tries"
+
+
 def test_what_has_no_place_on_the_other_is_put_next_to_it_and_pushed(monkeypatch):
     world = SimpleNamespace(held=["mat_0", ""], facts=SimpleNamespace(holds=lambda *_: gap[0] <= 0.0))
+    world.body, world.missed = SimpleNamespace(opening=None), collections.Counter()
     gap, done = [0.6], list[str]()
 
     def place(predicate, until=""):

@@ -36,6 +36,9 @@ away it can only point level."""
 PUSHING = 0.03
 """m in an agent step of a base that pushes things in its way."""
 
+PUSHED = 0.1
+"""m that a thing has moved by which has been pushed."""
+
 UPON = 0.03
 """m above an object's top up to which the bottom of what lies upon it is."""
 
@@ -59,17 +62,20 @@ def moved_out_of_the_way(world: PlannedWorld, step: Step) -> Generator[Program, 
 
 def _pushed_through(world: PlannedWorld, step: Step) -> Generator[Program, str, bool]:
     """Drives towards what a step is about as if loose things were not there, slowly, so that the base pushes them;
-    returns whether it came nearer. A robot that is shut in by them has no other way out."""
+    returns whether it came nearer and something has moved. A robot that is shut in by them has no other way out."""
     point = target_of(world, step)
     if point is None or (reach := _nearer(world, step, point)) <= 0.0:
         return False
-    without = [world.index(n) for n in _loose(world, step)]
+    loose = _loose(world, step)
+    without, before = [world.index(n) for n in loose], [world.com(n) for n in loose]
     freed = world.floor(without=without)
     goal = nearest_floor(world, freed, point, reach)
     way = None if goal is None else freed.way(world.base[0], goal)
     if goal is None or way is None:
         return False
     yield drive(way, None, PUSHING)
+    if all(np.linalg.norm(world.com(n) - b) < PUSHED for n, b in zip(loose, before, strict=True)):
+        return False  # what the base came up to stays there
     left = world.floor(without=without).way(world.base[0], goal)
     return left is not None and _length(way) - _length(left) > GAIN
 

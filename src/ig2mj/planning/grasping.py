@@ -30,6 +30,7 @@ from ig2mj.planning.moves import (
     hand_with,
     rest,
     travel,
+    tries_left,
     vector3,
 )
 from ig2mj.planning.opening import Tried, open_around
@@ -95,7 +96,8 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
     if not is_graspable(world, name):
         return Outcome("no_grasp", f"{name} is fixed, or its category allows no assisted grasp")
     reason, detail, tried, moved = "no_grasp", "", list[GraspPose](), Tried()
-    nowhere, missed, attempts = 0, 0, ATTEMPTS if world.body.opening is None else ARM_ATTEMPTS
+    most = ATTEMPTS if world.body.opening is None else ARM_ATTEMPTS
+    nowhere, missed, attempts = 0, 0, tries_left(most, world.missed[f"grasp {name}"], world.body.opening)
     for attempt in range(attempts):
         if nowhere and nowhere >= world.held.count(""):  # no hand finds a way
             break
@@ -132,7 +134,9 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         tried.append(pose)
         reason, detail = yield from _take(world, name, hand, pose, attempt)
         if name in world.held:
+            world.missed[f"grasp {name}"] = 0
             return Outcome(attempts=missed)
+        world.missed[f"grasp {name}"] += 1
     return Outcome(reason or "no_grasp", detail, attempts=max(missed, 1))
 
 

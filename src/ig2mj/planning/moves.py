@@ -28,6 +28,9 @@ Primitive = Generator[Program, str, Outcome]
 ATTEMPTS = 4
 """Tries of a primitive."""
 
+FEWEST = 2
+"""Tries of a gripper at least, whatever has failed before."""
+
 ABOVE, BELOW = 0.12, 0.03
 """m: above a grasp at which a hand comes to it, and below an object's top that it goes for, until it touches."""
 
@@ -57,6 +60,16 @@ class PrimitiveFailed(Exception):
 
     reason: str
     detail: str
+
+
+def tries_left(most: int, missed: int, opening: float | None) -> int:
+    """Tries of a primitive that are left for something that has been tried in vain in this episode by a gripper, whose
+    same ways fail again. Other hands have all of them.
+
+    Args:
+      most: tries of a first request. missed: tries in vain (`PlannedWorld.missed`). opening: m; None: no gripper.
+    """
+    return most if opening is None else max(min(FEWEST, most), most - missed)
 
 
 # Hands.

@@ -33,6 +33,7 @@ from ig2mj.planning.moves import (
     hand_path,
     rest,
     travel,
+    tries_left,
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
@@ -105,7 +106,9 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
     def set_open(world: PlannedWorld, step: Step) -> Primitive:
         name, reason, detail = step.object, "no_grasp", ""
         passed, nowhere, tries, failed = dict[str, int](), 0, 1, False
-        moves = 2 * ATTEMPTS - 1 + len(joints_of(world, name)) if world.body.opening is None else ARM_MOVES
+        count = 2 * ATTEMPTS - 1 + len(joints_of(world, name)) if world.body.opening is None else ARM_MOVES
+        key = f"move {name}"
+        moves = tries_left(count, world.missed[key], world.body.opening)
         for _ in range(moves):
             if world.facts.holds("open", name) == value:
                 return Outcome(attempts=tries)
@@ -121,7 +124,9 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             if nowhere == HANDS * len(joints):
                 break
             now = {j.name: j.fraction for j in joints_of(world, name)}
-            passed[joint.name] = tried + (_progress(joint, now, value) < MOVED)
+            still = _progress(joint, now, value) < MOVED
+            passed[joint.name] = tried + still
+            world.missed[key] = world.missed[key] + 1 if still else 0
         if world.facts.holds("open", name) == value:
             return Outcome(attempts=tries)
         return Outcome(reason or "not_true_after", detail, attempts=tries)

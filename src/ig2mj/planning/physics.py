@@ -6,6 +6,7 @@ that have nothing to do stand still.
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 import math
 import time
@@ -102,6 +103,7 @@ class PhysicsRung:
         self._programs: list[Program] = [[] for _ in range(count)]
         self._carry = execution.begin(self._programs)
         self._count, self._steps, self._planning = [0] * count, [0] * count, [0.0] * count
+        self._missed = [collections.Counter[str]() for _ in range(count)]
         self._ended: dict[int, Outcome] = {}
         self.watch: Callable[[], None] = lambda: None
 
@@ -114,7 +116,9 @@ class PhysicsRung:
         if self._query is None:
             self._query = SceneQuery(self.stage.scene)
         rng = np.random.default_rng([self._seed, self._numbers[world], self._count[world]])
-        return PlannedWorld(self.stage, self.body, self.domain, self._planner, self._query, world, rng)
+        found = PlannedWorld(self.stage, self.body, self.domain, self._planner, self._query, world, rng)
+        found.missed = self._missed[world]
+        return found
 
     def facts(self, world: int) -> Facts:
         return self.world(world).facts
@@ -231,6 +235,7 @@ class PhysicsRung:
         """
         self.stop(world)
         self._ended.pop(world, None)
+        self._missed[world].clear()
         self._numbers[world], self._count[world], self._asked[world] = number, 0, None
 
     def program(self, world: int) -> Program:

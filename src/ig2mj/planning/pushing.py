@@ -25,6 +25,7 @@ from ig2mj.planning.moves import (
     hand_path,
     rest,
     travel,
+    tries_left,
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
@@ -73,19 +74,20 @@ def push(world: PlannedWorld, step: Step) -> Primitive:
                 return put
         tries += 1
     reason, detail = "no_base", f"no free floor from which a hand can push {name} towards {other}"
-    failed, missed = 0, False
+    failed, missed, most = 0, False, tries_left(ATTEMPTS, world.missed[f"push {name}"], world.body.opening)
     for _ in range(ROUNDS):
         if world.facts.holds("in_contact_with", name, other):
             return Outcome(attempts=tries)
         tries += missed  # else the next stroke goes on where the last was to end
         ways = _towards(world, name, other)
         pushed = yield from _push_once(world, name, ways, failed)
-        if pushed is None or failed >= ATTEMPTS:
+        if pushed is None or failed >= most:
             break
         reason, moved = pushed
         missed = bool(reason) or moved < HALF * min(ways[0][1], STROKE)
         detail = f"the hand has no path to {name}" if reason == "no_path" else f"{name} does not reach {other}"
         failed += moved < PRESS
+        world.missed[f"push {name}"] = 0 if moved >= PRESS else world.missed[f"push {name}"] + 1
     if world.facts.holds("in_contact_with", name, other):
         return Outcome(attempts=tries)
     return Outcome(reason or "not_true_after", detail, attempts=tries)
@@ -101,15 +103,17 @@ def push_aside(
       opens: whether a floor has the way. without: objects that do not count there.
     """
     failed, ignored = 0, [world.index(n) for n in without]
+    most = tries_left(ATTEMPTS, world.missed[f"push {name}"], world.body.opening)
     for _ in range(ROUNDS):
         if opens(world.floor(without=ignored)):
             return True
-        if failed == ATTEMPTS or not (ways := _ways_aside(world, name, opens, ignored)):
+        if failed == most or not (ways := _ways_aside(world, name, opens, ignored)):
             return False
         pushed = yield from _push_once(world, name, ways, failed)
         if pushed is None:
             return False
         failed += pushed[1] < PRESS
+        world.missed[f"push {name}"] = 0 if pushed[1] >= PRESS else world.missed[f"push {name}"] + 1
     return opens(world.floor(without=ignored))
 
 

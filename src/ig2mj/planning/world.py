@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 import functools
 from collections.abc import Collection, Sequence
@@ -84,6 +85,7 @@ class PlannedWorld:
 
     Attributes:
       stage, body, domain, planner: of all worlds. query: a world of the scene on the native engine, to sample spots in.
+      missed: how often in this episode a gripper has tried something in vain, by what that was (`moves.tries_left`).
       world: number. rng: of this primitive. crosses: a base on wheels drives over edges of carpets, at which it may get
         stuck.
     """
@@ -96,6 +98,7 @@ class PlannedWorld:
     world: int
     rng: np.random.Generator
     crosses: bool = False
+    missed: collections.Counter[str] = dataclasses.field(default_factory=collections.Counter)
     _points: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
     _sensed: tuple[PhysicsView, Senses] | None = dataclasses.field(default=None, init=False)
 
