@@ -14,7 +14,7 @@ from ig2mj.planning import Domain, PlanningError, SymbolicRung, TaskPlanner, mak
 from ig2mj.planning.facts import Facts
 from ig2mj.planning.pddl import domain_pddl, problem_pddl
 from ig2mj.planning.solver import _Episode
-from ig2mj.planning.step_order import ordered
+from ig2mj.planning.step_order import ordered, supports_first
 from ig2mj.planning.steps import PRIMITIVES, Outcome, Step
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.predicates.host_queries import HostQueries
@@ -334,6 +334,12 @@ def test_what_was_taken_for_a_condition_is_first_put_where_that_becomes_true(mod
     assert first(["book"], beside) == beside
     assert first(["book"], None) == floor
     assert first([], beside) == floor
+
+
+def test_what_is_next_to_a_container_comes_after_what_goes_into_it():
+    texts = ["(next_to book bag)", "(inside pen bag)", "(on_top bag bed)", "(next_to bag lamp)"]
+    order = [str(c) for c in supports_first(read_conditions(texts))]
+    assert order == ["(on_top bag bed)", "(next_to bag lamp)", "(inside pen bag)", "(next_to book bag)"]
 
 
 @pytest.mark.parametrize(("step", "serves", "counts"), [
