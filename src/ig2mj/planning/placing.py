@@ -72,9 +72,10 @@ UNDER = 0.85
 """m, horizontal, that the base of hands that float would like to be from what is put below something: it is let down
 before that, and goes straight in."""
 
-STANCES, AROUND, WAYS, ARM_WAYS = 3, 12, 30, 200
+STANCES, AROUND, WAYS, ARM_WAYS, FEWEST_WAYS = 3, 12, 30, 200, 50
 """Stances for each spot, those among which they are looked for where a gripper has to point ahead, and ways of a hand
-that are looked for, at most: of one that floats, and of one on an arm."""
+that are looked for, at most: of one that floats, and of one on an arm, of which there are fewer where earlier requests
+have found none, and these at least."""
 
 
 def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[[PlannedWorld, Step], Primitive]:
@@ -116,6 +117,7 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                     placed, detail = put_there(world.facts, step, until or predicate)
                     if placed and not detail:
                         return Outcome(attempts=tries + 1)
+                world.missed[f"{predicate} {name}"] += found == _NO_WAY
                 break
             tries += 1  # to take it by another side, or to set a container upright, is none
             stance, spot = found
@@ -428,4 +430,5 @@ def _plan(
         goal = target + (LET_GO + spot.drop) * UP
         return hand_path(standing, spheres, start, goal, back, SPARE, search, follows, turns=True) is not None
 
-    return first_way(candidates(), has_way, WAYS if floats else ARM_WAYS, search) or lacking
+    ways = WAYS if floats else max(FEWEST_WAYS, ARM_WAYS // (1 + world.missed[f"{predicate} {name}"]))
+    return first_way(candidates(), has_way, ways, search) or lacking

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -126,7 +128,9 @@ def spots_for(
         refused = list[Vector]()
         for support in ("full", "balanced", "loose") if predicate == "inside" else ("full", "balanced"):
             found = list[Vector]()
-            positions = np.array(list(placer.spots(index, areas, new, world.rng, support))).reshape(-1, 3)
+            sample = functools.partial(_sampled, placer, index, areas, new, world.rng, support)
+            key = ("spots", predicate, name, where, tuple(also), new.tobytes(), support)
+            positions = sample() if world.body.opening is None else world.kept(key, sample)
             cost = farther(positions)
             if predicate == "on_floor":
                 cost += _cramped(world, positions)
@@ -145,6 +149,12 @@ def spots_for(
                     yield Spot(at, turn, bool(roofed[k]))
             if found:
                 break
+
+
+def _sampled(placer: Placer, *arguments: Any) -> Float[np.ndarray, "n 3"]:
+    """All positions that `Placer.spots` gives. Those of an arm are kept: it asks for the same again to let things fall
+    there, or down narrow ways."""
+    return np.array(list(placer.spots(*arguments))).reshape(-1, 3)
 
 
 def _varied(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import collections
 import dataclasses
 import functools
-from collections.abc import Collection, Sequence
-from typing import Any
+from collections.abc import Callable, Collection, Hashable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -57,6 +57,8 @@ AWAY, FARTHEST = 0.55, 0.95
 POINTS = 0.2
 """Horizontal part of where a gripper points, from which on it says on which side of it the robot stands."""
 
+Kept = TypeVar("Kept")
+
 Vector = Float[np.ndarray, "3"]
 Rotation = Float[np.ndarray, "3 3"]
 
@@ -100,6 +102,7 @@ class PlannedWorld:
     crosses: bool = False
     missed: collections.Counter[str] = dataclasses.field(default_factory=collections.Counter)
     _points: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    _kept: tuple[PhysicsView, dict[Any, Any]] | None = dataclasses.field(default=None, init=False)
     _sensed: tuple[PhysicsView, Senses] | None = dataclasses.field(default=None, init=False)
 
     @property
@@ -112,6 +115,15 @@ class PlannedWorld:
         if self._sensed is None or self._sensed[0] is not view:
             self._sensed = view, sense(view, self.stage.agent, self.body.hands, self.body.friction)
         return self._sensed[1]
+
+    def kept(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
+        """What `make` gives; asked again with the same key before something has moved, the same object."""
+        view = self.view
+        if self._kept is None or self._kept[0] is not view:
+            self._kept = view, {}
+        if key not in self._kept[1]:
+            self._kept[1][key] = make()
+        return self._kept[1][key]
 
     @property
     def facts(self) -> Facts:
