@@ -87,9 +87,9 @@ EMPTY, FULL = (0.04, 0.05), (0.004, 0.015)
 """m in an agent step of a hand that pulls, and m within which it has reached a place on the way: of what is empty, and
 of a drawer with things in it. A hand moves in jerks, one in each agent step, under which things slide to the back."""
 
-ARM_SWING, ARM_MOVES = 0.35, 14
-"""Share of a joint's range by which an arm moves it from one stance where it does not follow it to its end; and such
-moves for one primitive."""
+ARM_SWING, ARM_MOVES, ARM_STILL = 0.35, 14, 6
+"""Share of a joint's range by which an arm moves it from one stance where it does not follow it to its end; such moves
+for one primitive, and how many of them in a row move nothing, at most."""
 
 SLIDES = (0.3, 0.15)
 """Shares of its range by which a hand that floats moves what slides, where it does not reach all of the way at once."""
@@ -106,10 +106,10 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
     def set_open(world: PlannedWorld, step: Step) -> Primitive:
         name, reason, detail = step.object, "no_grasp", ""
         passed, nowhere, tries, failed = dict[str, int](), 0, 1, False
-        count = 2 * ATTEMPTS - 1 + len(joints_of(world, name)) if world.body.opening is None else ARM_MOVES
-        key = f"move {name}"
-        moves = tries_left(count, world.missed[key], world.body.opening)
-        for _ in range(moves):
+        floats, key = world.body.opening is None, f"move {name}"
+        count = 2 * ATTEMPTS - 1 + len(joints_of(world, name)) if floats else ARM_MOVES
+        still_left = most = tries_left(count if floats else ARM_STILL, world.missed[key], world.body.opening)
+        for _ in range(count):
             if world.facts.holds("open", name) == value:
                 return Outcome(attempts=tries)
             tries += failed  # else the next move is of another joint, or goes on where the last was to end
@@ -127,9 +127,11 @@ def set_open(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             still = _progress(joint, now, value) < MOVED
             passed[joint.name] = tried + still
             world.missed[key] = world.missed[key] + 1 if still else 0
-        if world.facts.holds("open", name) == value:
-            return Outcome(attempts=tries)
-        return Outcome(reason or "not_true_after", detail, attempts=tries)
+            still_left = still_left - 1 if still else most
+            if not still_left:
+                break
+        done = world.facts.holds("open", name) == value
+        return Outcome(attempts=tries) if done else Outcome(reason or "not_true_after", detail, attempts=tries)
 
     return set_open
 
