@@ -142,6 +142,7 @@ class _Nothing(Obstacles):
     def __init__(self):
         self._keep, self._body, self._carried = np.zeros(0, bool), None, np.zeros((0, 4))
         self._low = self._high = np.zeros((0, 3))
+        self._bounds = np.zeros((6, 0))
 
 
 def test_a_hand_goes_where_its_arm_brings_it_off_the_line_only_where_nothing_else_is_found():

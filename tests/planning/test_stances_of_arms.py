@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,6 +22,7 @@ class _World(PlannedWorld):
 
     def __init__(self, opening):
         self.body = SimpleNamespace(opening=opening)  # pyright: ignore[reportAttributeAccessIssue]
+        self.missed = Counter[str]()
 
     def obstacles(self, without=(), at=None, stays=True):
         return None  # pyright: ignore[reportReturnType]

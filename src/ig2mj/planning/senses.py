@@ -6,6 +6,7 @@ Axes: W worlds, H hands of the robot, F links of fingers, O objects, Y graspable
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -29,7 +30,7 @@ class Senses:
     touching: Bool[np.ndarray, "W O"]
     joints: Float[np.ndarray, "W J"] | None = None
 
-    @property
+    @functools.cached_property
     def yaw(self) -> Float[np.ndarray, "W"]:
         """Direction of the base, rad."""
         w, x, y, z = np.moveaxis(self.base_quat, -1, 0)
