@@ -20,6 +20,15 @@ def test_new_programs_of_some_worlds_leave_the_others_as_they_are():
     assert over.running.tolist() == [False, True, False] and over.status[0] == execution.DONE
 
 
+def test_behind_the_end_of_a_new_program_nothing_of_the_old_one_is_left():
+    long = Programs.pack([[Phase(yaw=1.0, rise=0.2, limit=9) for _ in range(4)] for _ in range(2)])
+    new = long.with_rows(np.array([1]), Programs.pack([[Phase(yaw=2.0, rise=0.3)]]))
+    assert new.length.tolist() == [4, 1] and long.length.tolist() == [4, 4] and (long.yaw == 1.0).all()
+    assert new.yaw.tolist() == [[1.0] * 4, [2.0, 0.0, 0.0, 0.0]]
+    assert new.limit[1, 1:].tolist() == [0, 0, 0]
+    np.testing.assert_array_equal(new.rise[1], np.float32([0.3, np.nan, np.nan, np.nan]))
+
+
 def test_a_batch_that_is_packed_at_once_is_the_same():
     programs = [[Phase(hand=0, pos=(1.0, 2.0, 3.0))], [Phase(rise=0.1), Phase(close=True)]]
     one = Programs.pack(programs)

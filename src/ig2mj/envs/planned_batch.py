@@ -188,6 +188,7 @@ class _Episodes:
         self.carry = execution.begin([[]] * count)
         self.numbers: dict[int, int] = {}  # of the worlds whose episodes go on
         self.over: list[int] = []  # worlds whose episodes are over
+        self.stopped: list[int] = []  # of these, the ones whose programs still go on
         self.steps, self.begun = np.zeros(count, int), np.zeros(count, int)
         self.results: dict[int, EpisodeResult | Ig2mjError] = {}
         self.found: list[PlannedEpisode] = []
@@ -236,7 +237,7 @@ class _Episodes:
         seconds = float(self.steps[world] * self.env.period)
         episode = PlannedEpisode(number, success, q, "" if success else why, seconds)
         self.over.append(world)
-        self.carry = execution.begin_some(self.carry, {world: []})
+        self.stopped.append(world)
         self.found.append(episode)
         self.watch(episode)
 
@@ -256,7 +257,7 @@ class _Episodes:
             self.results[world] = answer
             success = isinstance(answer, EpisodeResult) and answer.success
             self._ended(world, success, answer.ended if isinstance(answer, EpisodeResult) else str(answer))
-        self.carry = execution.begin_some(self.carry, fresh)
+        self._set_programs(fresh)
         self.spent.planned += self.planners.seconds - before
         took = time.perf_counter() - began
         self.spent.blocked, self.spent.following = (
@@ -264,6 +265,11 @@ class _Episodes:
             self.spent.following + took * (not idle),
         )
         return bool(self.carry.running.any())
+
+    def _set_programs(self, programs: Mapping[int, Program]) -> None:
+        """Begins programs, and stops those of worlds whose episodes are over, in one change for all worlds."""
+        self.carry = execution.begin_some(self.carry, {world: [] for world in self.stopped} | dict(programs))
+        self.stopped.clear()
 
     def _step(self) -> None:
         """An agent step of all worlds, and requests for those whose programs have ended."""
@@ -281,6 +287,7 @@ class _Episodes:
         for world in sorted(self.numbers):
             if terminated[world] or truncated[world]:
                 self._ended(world, bool(terminated[world]), stage.ended(world) or "")
+        self._set_programs({})
         ended = [w for w in sorted(self.numbers) if not self.carry.running[w] and w not in self.planners.asked]
         for world, copy in zip(ended, self.batch.copies(ended), strict=True):
             seconds = float((self.steps[world] - self.begun[world]) * self.env.period)

@@ -157,15 +157,18 @@ class Programs:
 
     def with_rows(self, worlds: Int[np.ndarray, "k"], others: Programs) -> Programs:
         """The same with the programs of `others` in k worlds. P is that of the longest program that was ever there."""
-        most = max(self.base.shape[1], others.base.shape[1])
+        most, ends = max(self.base.shape[1], others.base.shape[1]), others.base.shape[1]
         found = {}
         for f in dataclasses.fields(self):
             old, new = getattr(self, f.name), getattr(others, f.name)
-            if f.name != "length":
-                old, new = (_longer(a, most, np.nan if f.name == "rise" else 0.0) for a in (old, new))
-            old = old.copy()
-            old[worlds] = new
-            found[f.name] = old
+            if f.name == "length":
+                found[f.name] = old.copy()
+                found[f.name][worlds] = new
+                continue
+            fill = np.nan if f.name == "rise" else 0.0
+            found[f.name] = _longer(old, most, fill)
+            found[f.name][worlds, :ends] = new
+            found[f.name][worlds, ends:] = fill
         return Programs(**found)
 
     def at(self, phase: Int[np.ndarray, "W"]) -> dict[str, np.ndarray]:
@@ -179,6 +182,8 @@ class Programs:
 
 
 def _longer(values: np.ndarray, count: int, fill: float) -> np.ndarray:
-    """Values of so many phases, [W, P, ...]; what is behind the end of a program is read when it has ended."""
-    more = [(0, 0), (0, count - values.shape[1]), *[(0, 0)] * (values.ndim - 2)]
-    return np.pad(values, more, constant_values=fill)
+    """A copy of values, [W, P, ...], with so many phases; those behind a program's end are read when it has ended."""
+    longer = np.empty((len(values), count, *values.shape[2:]), values.dtype)
+    longer[:, : values.shape[1]] = values
+    longer[:, values.shape[1] :] = fill
+    return longer
