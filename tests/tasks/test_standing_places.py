@@ -7,7 +7,7 @@ import numpy as np
 
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.scene.scene import load_scene
-from ig2mj.tasks.navigation.starts import Places
+from ig2mj.tasks.navigation.starts import Places, _apart
 
 
 def test_a_robot_stands_where_none_of_all_contacts_of_the_scene_is_one_of_it_with_more_than_the_ground():
@@ -26,3 +26,10 @@ def test_a_robot_stands_where_none_of_all_contacts_of_the_scene_is_one_of_it_wit
         answers.append(bool(places._ground[met].all()))
         assert places.stands(0, pose) == answers[-1]
     assert {True, False} == set(answers)
+
+
+def test_a_model_that_needs_the_high_bits_of_contact_types_is_left_as_it_is():
+    xml = '<mujoco><worldbody><geom size="1" contype="{}"/></worldbody></mujoco>'
+    for types, same in ((1 << 20, True), (3, False)):
+        model = mujoco.MjModel.from_xml_string(xml.format(types))
+        assert (_apart(model, np.zeros(1, bool)) is model) == same
