@@ -1,5 +1,6 @@
 """What is done where a hand has no way: put down where the robot stands, and pushed where it cannot be taken."""
 
+import collections
 import types
 
 import numpy as np
@@ -28,7 +29,7 @@ class World(PlannedWorld):
 
 def world_in(room: str, graspable: bool = True) -> World:
     found = object.__new__(World)
-    found.__dict__["holding"], found.room = ["book"], room
+    found.__dict__["holding"], found.room, found.missed = ["book"], room, collections.Counter()
     found.domain = types.SimpleNamespace(  # pyright: ignore
         hands_for=lambda name: 1, graspable=lambda name: graspable, loose=["book", "rug"]
     )
@@ -124,10 +125,10 @@ def test_what_is_in_the_way_is_what_bars_it_with_what_comes_before_not_what_stan
     assert barring is None or (found not in barring[1] and not (bars - {found}) & set(barring[1]))
 
 
-@pytest.mark.parametrize(("driven", "came"), [(0.0, False), (1.5, True)])
-def test_a_base_on_wheels_that_is_shut_in_pushes_through_what_it_cannot_move(monkeypatch, driven, came):
-    """A robot at x = 0 is to go to x = 2; it gets as far as `driven` (m)."""
-    world, at = world_in("kitchen_0"), [0.0]
+@pytest.mark.parametrize(("driven", "pushed", "came"), [(0.0, 0.0, False), (1.5, 0.5, True), (1.5, 0.0, False)])
+def test_a_base_on_wheels_that_is_shut_in_pushes_through_what_it_cannot_move(monkeypatch, driven, pushed, came):
+    """A robot at x = 0 is to go to x = 2; it gets as far as `driven` (m), and what stands there is `pushed` (m)."""
+    world, at, stands = world_in("kitchen_0"), [0.0], [1.0]
     world.body = types.SimpleNamespace(opening=0.1)  # pyright: ignore
     floor = types.SimpleNamespace(way=lambda here, goal: np.array([[at[0], 0.0], [2.0, 0.0]]))
     monkeypatch.setattr(World, "floor", lambda *_, **__: floor)
@@ -136,10 +137,11 @@ def test_a_base_on_wheels_that_is_shut_in_pushes_through_what_it_cannot_move(mon
     monkeypatch.setattr(clutter, "target_of", lambda *_: (2.0, 0.0, 0.0))
     monkeypatch.setattr(clutter, "_nearer", lambda *_: 1.0)
     monkeypatch.setattr(clutter, "nearest_floor", lambda *_: np.array([2.0, 0.0]))
+    monkeypatch.setattr(World, "com", lambda self, name: np.array([stands[0], 0.0, 0.0]))
     running = clutter._pushed_through(world, Step("grasp", ("cup",)))
     (phase,) = next(running)
     assert phase.xy == (2.0, 0.0) and phase.speed == clutter.PUSHING
-    at[0] = driven
+    at[0], stands[0] = driven, stands[0] + pushed
     assert ended(running) == came
 
 
