@@ -114,8 +114,9 @@ class PlacedPieces:
             for whole, part in zip(kept, new, strict=True):
                 whole[moved] = part
             new = kept
-        bounds = np.ascontiguousarray(np.concatenate([new[2], -new[3]], axis=1).T)
-        self._of_world[world] = placed = _Placed(pose, *new, bounds)
+        normal, offset, low, high = new
+        bounds = np.ascontiguousarray(np.concatenate([low, -high], axis=1).T)
+        self._of_world[world] = placed = _Placed(pose, normal, offset, low, high, bounds)
         return placed
 
 
