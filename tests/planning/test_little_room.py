@@ -5,17 +5,15 @@ import types
 
 import numpy as np
 import pytest
+from still_world import still_world
 
 import ig2mj
 from ig2mj.agents import Humanoid
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning import clutter, grasping, grasps, opening, placing, spots
-from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.clearance import Obstacles
-from ig2mj.planning.domain import Domain
 from ig2mj.planning.free_floor import FreeFloor
 from ig2mj.planning.joints import openable_joints
-from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.phases import Until
 from ig2mj.planning.pushing import _ways_aside
 from ig2mj.planning.spots import spots_upon
@@ -24,31 +22,12 @@ from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.taking import spheres_of
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance
 from ig2mj.sampling.query import SceneQuery
-from ig2mj.worlds.rules import Rules
 
 
 @pytest.fixture(scope="module")
 def world(tiny_home_folder):
     scene = ig2mj.load_scene(tiny_home_folder, agents=[Humanoid().at(-0.9, -0.5, 0.0)])
-    body = body_of(scene, scene.agents[0].controller(scene.tables, 0, 0.1))
-    query = SceneQuery(scene)
-    view, start = query.view, query.save()
-    model = Rules.of_scene(scene).model
-    stage = types.SimpleNamespace(
-        scene=scene,
-        view=view,
-        model=model,
-        states=None,
-        snapshot=lambda world: start,
-        agent=0,
-        controller=None,
-        num_worlds=1,
-        by_friction=False,
-        act=print,
-        ended=print,
-    )
-    domain = Domain(model, 2)
-    return PlannedWorld(stage, body, domain, MotionPlanner(scene), query, 0, np.random.default_rng(0))
+    return still_world(scene, SceneQuery(scene))
 
 
 class _Ceiling(Obstacles):
