@@ -40,8 +40,6 @@ def test_processes_plan_while_worlds_wait(make):
 
 def test_worlds_of_warp_reach_the_same_goals(make):
     with PlannedBatch(make("warp")) as batch:
-        copies = batch.stage.observe(batch.env.reset(0)) or batch.copies([1, 0])
-        assert len(copies) == 2 and copies[0].physics.time.shape == ()
         assert [e.success for e in batch.run(range(2))] == [True, True]
 
 

@@ -3,6 +3,8 @@
 import multiprocessing
 from types import SimpleNamespace
 
+import numpy as np
+
 import ig2mj
 from ig2mj.envs.planning_processes import TOGETHER, PlanningProcesses
 
@@ -28,15 +30,20 @@ def test_a_process_gets_its_next_requests_when_it_has_answered_all(monkeypatch):
     """Several at once: with one for each step of the worlds, most of 1,024 hold still while processes rest."""
     pipes = [Pipe(), Pipe()]
     left = iter(pipes)
-    context = SimpleNamespace(Pipe=lambda: (next(left), SimpleNamespace(close=lambda: None)), Process=Process)
+    other_end = SimpleNamespace(close=lambda: None)
+    context = SimpleNamespace(
+        Pipe=lambda: (next(left), other_end), Process=Process, RawArray=lambda kind, size: bytearray(size)
+    )
     monkeypatch.setattr(multiprocessing, "get_context", lambda kind: context)
-    env = SimpleNamespace(config=ig2mj.EnvConfig(), task=SimpleNamespace(name="any"))
+    worlds = 2 * TOGETHER + 4
+    env = SimpleNamespace(config=ig2mj.EnvConfig(), task=SimpleNamespace(name="any"), num_worlds=worlds)
     with PlanningProcesses(env, 2) as planners:  # pyright: ignore[reportArgumentType]
-        for world in range(2 * TOGETHER + 4):
-            planners.begin(world, world, None)  # pyright: ignore[reportArgumentType]
+        planners.keep(range(worlds), np.zeros((worlds, 3)), [np.zeros(worlds)])  # pyright: ignore[reportArgumentType]
+        for world in range(worlds):
+            planners.begin(world, world)
         assert [pipe.sent for pipe in pipes] == [[[0]], [[1]]]
         pipes[0].other.send((0, [], 0.5))
-        assert list(planners.answers(wait=True)) == [(0, [])]
+        assert list(planners.answers(wait=None)) == [(0, [])]
         most = list(range(2, 2 * TOGETHER + 1, 2))
         assert [pipe.sent for pipe in pipes] == [[[0], most], [[1]]]
         assert planners.asked == set(range(1, 2 * TOGETHER + 4)) and planners.seconds == 0.5

@@ -38,6 +38,17 @@ def test_a_batch_that_is_packed_at_once_is_the_same():
         assert np.array_equal(a[..., : b.shape[-1]] if a.shape != b.shape else a, b), name
 
 
+def test_programs_of_several_batches_are_those_of_their_worlds():
+    long, short = [Phase(yaw=1.0, rise=0.1), Phase(yaw=2.0), Phase(yaw=3.0)], [Phase(yaw=4.0, limit=7)]
+    both = Programs.together([Programs.pack([long]), Programs.pack([[]]), Programs.pack([short, long])])
+    every = Programs.pack([long, [], short, long])
+    assert both.length.tolist() == every.length.tolist() == [3, 0, 1, 3]
+    for world, count in enumerate(every.length):
+        for name in ("yaw", "rise", "limit", "pos", "hand"):
+            np.testing.assert_array_equal(getattr(both, name)[world, :count], getattr(every, name)[world, :count])
+    assert np.isnan(both.rise[2, 1:]).all()
+
+
 @pytest.mark.parametrize(("until", "held", "fails"), [
     (Until.HELD, "drawer", True), (Until.HELD, "pen", False), (Until.HELD, "", False), (Until.WAITED, "drawer", False),
 ])  # fmt: skip

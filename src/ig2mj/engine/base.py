@@ -294,16 +294,16 @@ class Engine(Protocol):
         """One world as a snapshot without the world axis, in numpy arrays that share no memory with the engine."""
         ...
 
-    def gather(self, physics: Physics, tree: Any, worlds: Sequence[int]) -> list[tuple[Snapshot, Any]]:
+    def gather(self, physics: Physics, tree: Any, worlds: Sequence[int]) -> tuple[Snapshot, Any]:
         """Some worlds on the host.
 
         Args:
           physics: as returned by the last call.
           tree: arrays [W, ...] that go with it.
-          worlds: their numbers.
+          worlds: numbers of k of them, at least one.
 
         Returns:
-          of each world a snapshot, as of `export`, and its rows of the tree [1, ...], in numpy arrays of their own.
+          their snapshots, and rows of the tree, in numpy arrays [k, ...] of their own.
         """
         ...
 

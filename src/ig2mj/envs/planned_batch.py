@@ -7,7 +7,7 @@
 All worlds take an agent step together, in one call. Programs of all worlds are followed in one batch on the host
 (`ig2mj.planning.execution`). A world whose program has ended is copied to the process that plans for it, holds still
 until the answer is there, and delays no other world. Copies of several worlds leave the device together
-(`Engine.gather`), in batches of `GATHERED`, so that nothing is compiled again.
+(`Engine.gather`), in batches of `GATHERED`, so that nothing is compiled again. Answers are read while the device steps.
 
 Axes: W worlds.
 """
@@ -23,17 +23,19 @@ import jax
 import numpy as np
 
 from ig2mj.engine.base import GATHERED
+from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.planning_processes import PlanningProcesses
 from ig2mj.envs.planning_stage import EnvironmentStage
 from ig2mj.errors import Ig2mjError
 from ig2mj.planning import execution
-from ig2mj.planning.away import WorldCopy
-from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.body_kinds import body_of
-from ig2mj.planning.moves import Program
+from ig2mj.planning.phases import Programs
 from ig2mj.planning.physics import check_robot
 from ig2mj.planning.solver import EpisodeResult
+
+LISTENING = 0.002
+"""s that answers are waited for at a time while the device steps the worlds."""
 
 REFILL = 16
 """Share of the worlds, one in so many, whose episodes are over before they begin others: one call resets them all."""
@@ -60,10 +62,11 @@ class Spent:
     """Wall time of a run, by what it was spent on.
 
     Attributes:
-      stepping: s in the environment's step, until its results are there. following: s in which programs are followed
-        and answers read. copying: s in which worlds are copied. blocked: s in which no world had a program.
+      stepping: s in the environment's step, until its results are there. following: s in which programs are followed,
+        and answers read while the environment does not step. copying: s in which worlds are copied. blocked: s in which
+        no world had a program.
       world_steps: agent steps of all worlds. waited: of these, those in which a world held still for its planner.
-      planned: processor s of all processes. primitives: programs that were planned.
+      planned: processor s of all processes. programs: that were planned.
     """
 
     stepping: float = 0.0
@@ -150,22 +153,26 @@ class PlannedBatch:
         """Compiles what a run needs, and waits until all processes can plan. Its time is not counted."""
         self.stage.observe(self.env.reset(0))
         count = self.env.num_worlds
+        world = self.stage.state.batch.world
         for size in (s for s in GATHERED if s <= max(count, 1)):
-            self.copies(list(range(size)))
+            self.env.core.engine.gather(world.physics, world.states, range(size))
         self.stage.act(np.zeros((count, self.body.size), np.float32))
         self.stage.observe(self.env.reset(self.stage.state, np.ones(count, bool)))
-        for world, copy in enumerate(self.copies(list(range(min(count, self.planners.count))))):
-            self.planners.begin(world, world, copy)
+        every = range(min(count, self.planners.count))
+        self.keep(every)
+        for number in every:
+            self.planners.begin(number, number)
         while self.planners.asked:
-            for _ in self.planners.answers(wait=True):
+            for _ in self.planners.answers(wait=None):
                 pass
         self.planners.seconds = 0.0
 
-    def copies(self, worlds: Sequence[int]) -> list[WorldCopy]:
-        """Copies of some worlds, on the host."""
-        world = self.stage.state.batch.world
-        gathered = self.env.core.engine.gather(world.physics, world.states, worlds)
-        return [WorldCopy(physics, jax.tree.leaves(states)) for physics, states in gathered]
+    def keep(self, worlds: Sequence[int]) -> None:
+        """Copies some worlds for who plans for them."""
+        if worlds:
+            world = self.stage.state.batch.world
+            physics, states = self.env.core.engine.gather(world.physics, world.states, worlds)
+            self.planners.keep(worlds, physics, jax.tree.leaves(states))
 
     def close(self) -> None:
         """Ends the processes that plan; may be called twice."""
@@ -189,6 +196,7 @@ class _Episodes:
         self.numbers: dict[int, int] = {}  # of the worlds whose episodes go on
         self.over: list[int] = []  # worlds whose episodes are over
         self.stopped: list[int] = []  # of these, the ones whose programs still go on
+        self.fresh: dict[int, Programs] = {}  # of worlds whose programs begin with the next step
         self.steps, self.begun = np.zeros(count, int), np.zeros(count, int)
         self.results: dict[int, EpisodeResult | Ig2mjError] = {}
         self.found: list[PlannedEpisode] = []
@@ -197,7 +205,7 @@ class _Episodes:
         """Until all are over. `first`: numbers by world. `episodes`: worlds begin others until so many have begun."""
         begun = len(first)
         while self.planners.asked:  # of episodes that were over before their planner had answered
-            for _ in self.planners.answers(wait=True):
+            for _ in self.planners.answers(wait=None):
                 pass
         self._begin(first)
         while self.numbers:
@@ -225,10 +233,11 @@ class _Episodes:
         worlds = sorted(numbers)
         self.numbers |= numbers
         self.carry = execution.begin_some(self.carry, {world: [] for world in worlds})
-        for world, copy in zip(worlds, self.batch.copies(worlds), strict=True):
+        self.batch.keep(worlds)
+        for world in worlds:
             self.results.pop(world, None)
             self.steps[world] = 0
-            self.planners.begin(world, numbers[world], copy)
+            self.planners.begin(world, numbers[world])
         self.spent.copying += time.perf_counter() - began
 
     def _ended(self, world: int, success: bool, why: str) -> None:
@@ -238,27 +247,16 @@ class _Episodes:
         episode = PlannedEpisode(number, success, q, "" if success else why, seconds)
         self.over.append(world)
         self.stopped.append(world)
+        self.fresh.pop(world, None)
         self.found.append(episode)
         self.watch(episode)
 
     def _answers(self) -> bool:
         """Takes the planners' answers; whether a step can be taken: some world has a program."""
-        began, before, fresh = time.perf_counter(), self.planners.seconds, dict[int, Program]()
+        began = time.perf_counter()
         idle = all(world in self.planners.asked for world in self.numbers)
-        for world, answer in self.planners.answers(wait=idle):
-            if world not in self.numbers:
-                continue
-            if isinstance(answer, list):
-                self.spent.programs += 1
-                body = self.batch.body
-                fresh[world] = body.prepared(answer) if isinstance(body, HandedBody) else answer
-                self.begun[world] = self.steps[world]
-                continue
-            self.results[world] = answer
-            success = isinstance(answer, EpisodeResult) and answer.success
-            self._ended(world, success, answer.ended if isinstance(answer, EpisodeResult) else str(answer))
-        self._set_programs(fresh)
-        self.spent.planned += self.planners.seconds - before
+        self._take(None if idle else 0.0)
+        self._set_programs()
         took = time.perf_counter() - began
         self.spent.blocked, self.spent.following = (
             self.spent.blocked + took * idle,
@@ -266,10 +264,29 @@ class _Episodes:
         )
         return bool(self.carry.running.any())
 
-    def _set_programs(self, programs: Mapping[int, Program]) -> None:
+    def _take(self, wait: float | None) -> None:
+        """Takes answers that are there. `wait`: see `PlanningProcesses.answers`."""
+        before = self.planners.seconds
+        for world, answer in self.planners.answers(wait):
+            if world not in self.numbers:
+                continue
+            if isinstance(answer, Programs):
+                self.spent.programs += 1
+                self.fresh[world] = answer
+                self.begun[world] = self.steps[world]
+                continue
+            self.results[world] = answer
+            success = isinstance(answer, EpisodeResult) and answer.success
+            self._ended(world, success, answer.ended if isinstance(answer, EpisodeResult) else str(answer))
+        self.spent.planned += self.planners.seconds - before
+
+    def _set_programs(self) -> None:
         """Begins programs, and stops those of worlds whose episodes are over, in one change for all worlds."""
-        self.carry = execution.begin_some(self.carry, {world: [] for world in self.stopped} | dict(programs))
+        changed = dict.fromkeys(self.stopped, Programs.pack([[]])) | self.fresh
+        if changed:
+            self.carry = execution.begin_packed(self.carry, list(changed), Programs.together(list(changed.values())))
         self.stopped.clear()
+        self.fresh.clear()
 
     def _step(self) -> None:
         """An agent step of all worlds, and requests for those whose programs have ended."""
@@ -277,22 +294,30 @@ class _Episodes:
         action, self.carry = execution.advance(self.batch.body, stage.agent, self.carry, stage.view)
         spent.following += time.perf_counter() - began
         began = time.perf_counter()
-        stage.act(action)
-        terminated, truncated = np.asarray(stage.state.terminated), np.asarray(stage.state.truncated)
-        spent.stepping += time.perf_counter() - began
         self.steps += 1
         spent.world_steps += len(self.numbers)
         spent.waited += sum(world in self.planners.asked for world in self.numbers)
+        stage.act(action)
+        while self.planners.asked and not self.planners.here and not _is_there(stage.state.terminated):
+            self._take(LISTENING)
+        terminated, truncated = np.asarray(stage.state.terminated), np.asarray(stage.state.truncated)
+        spent.stepping += time.perf_counter() - began
         began = time.perf_counter()
         for world in sorted(self.numbers):
             if terminated[world] or truncated[world]:
                 self._ended(world, bool(terminated[world]), stage.ended(world) or "")
-        self._set_programs({})
+        self._set_programs()
         ended = [w for w in sorted(self.numbers) if not self.carry.running[w] and w not in self.planners.asked]
-        for world, copy in zip(ended, self.batch.copies(ended), strict=True):
+        self.batch.keep(ended)
+        for world in ended:
             seconds = float((self.steps[world] - self.begun[world]) * self.env.period)
-            self.planners.go_on(world, copy, self.carry.reason(world), seconds)
+            self.planners.go_on(world, self.carry.reason(world), seconds)
         spent.copying += time.perf_counter() - began
+
+
+def _is_there(array: Array) -> bool:
+    """Whether an array has been computed."""
+    return not isinstance(array, jax.Array) or array.is_ready()  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def line_of(episode: PlannedEpisode) -> str:

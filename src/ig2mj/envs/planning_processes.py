@@ -1,12 +1,14 @@
 """`PlanningProcesses`: processes that plan for the worlds of an environment, while the environment steps them.
 
     with PlanningProcesses(env, 60) as planners:
-        planners.begin(world, number, copy)
+        planners.keep([world], physics, states)
+        planners.begin(world, number)
         for world, answer in planners.answers():
             ...
 
 Each world belongs to one process, which keeps its plan (`ig2mj.planning.away`). Processes make the scene for
-themselves, on the native engine, with one thread and without a GPU.
+themselves, on the native engine, with one thread and without a GPU. Copies of worlds are in memory that all share
+(`ig2mj.envs.shared_copies`); programs come back as arrays.
 """
 
 from __future__ import annotations
@@ -18,18 +20,29 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
+import jax
+import numpy as np
+
 from ig2mj.cluster.reporting import ONE_THREAD
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.envs.config import EnvConfig
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.registry import make
+from ig2mj.envs.shared_copies import SharedCopies
 from ig2mj.errors import EngineError, Ig2mjError
-from ig2mj.planning.away import Answer, PlanningAway, WorldCopy
+from ig2mj.planning.away import PlanningAway, WorldCopy
+from ig2mj.planning.phases import Programs
+from ig2mj.planning.solver import EpisodeResult
 
 TOGETHER = 8
 """Requests that a process gets at once, at most: a step of many worlds takes as long as it plans for some of them."""
+
+
+Answer = Programs | EpisodeResult | Ig2mjError
+"""The next program of a world, the result of its episode, or why there is neither."""
 
 
 def planning_of(env: Environment, seed: int = 0) -> PlanningAway:
@@ -45,7 +58,8 @@ class PlanningProcesses:
     """See the module's text; a context manager.
 
     Attributes:
-      count: of the processes, at least 1. asked: worlds that wait for an answer.
+      here: this process plans, when answers are asked for. count: of the processes, at least 1. asked: worlds that wait
+        for an answer.
       seconds: processor time that processes have planned, of all of them.
     """
 
@@ -57,6 +71,8 @@ class PlanningProcesses:
         Raises:
           EngineError: the environment has no goal.
         """
+        self.here = processes == 0
+        self.env, self._seed = env, seed
         self.count = max(processes, 1)
         self.asked: set[int] = set()
         self.seconds = 0.0
@@ -66,16 +82,32 @@ class PlanningProcesses:
         self._pipes: list[multiprocessing.connection.Connection] = []
         self._waiting = [collections.deque[tuple[Any, ...]]() for _ in range(processes)]  # requests by process
         self._pending = [0] * processes  # answers that a process still owes
-        if processes == 0:
-            return
+        self._copies: SharedCopies | None = None
+
+    def keep(self, worlds: Sequence[int], physics: Snapshot, states: Sequence[np.ndarray]) -> None:
+        """Takes copies of k worlds, from which their next requests are planned. The first call starts the processes.
+
+        Args:
+          worlds: none of which is in `asked`. physics, and leaves of the extended states: with an axis of k worlds.
+        """
+        if self._copies is None:
+            self._copies = self._start(_first(physics, states))
+        self._copies.put(worlds, physics, states)
+
+    def _start(self, like: WorldCopy) -> SharedCopies:
+        """Starts the processes. `like`: a copy of a world."""
+        env, count = self.env, self.env.num_worlds
+        if self._here is not None:
+            return SharedCopies(like, count)
         config = dataclasses.replace(env.config, worlds=1, engine="native", engine_options={}, observations=())
         context, before = multiprocessing.get_context("spawn"), dict(os.environ)
+        copies = SharedCopies(like, count, allocate=lambda size: context.RawArray("B", size))
         os.environ.update(ONE_THREAD)
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            for _ in range(processes):
+            for _ in range(self.count):
                 own, other = context.Pipe()
-                arguments = (other, env.task.name, config, seed)
+                arguments = (other, env.task.name, config, self._seed, like, count, copies.memory)
                 process = context.Process(target=_serve, args=arguments, daemon=True)
                 process.start()
                 other.close()
@@ -86,14 +118,15 @@ class PlanningProcesses:
             for name in ONE_THREAD:
                 os.environ.pop(name)
             os.environ.update(before)
+        return copies
 
-    def begin(self, world: int, number: int, copy: WorldCopy) -> None:
-        """Asks for the first program of an episode; see `PlanningAway.begin`."""
-        self._ask(world, ("begin", world, number, copy))
+    def begin(self, world: int, number: int) -> None:
+        """Asks for the first program of an episode; see `PlanningAway.begin`. Its copy is kept."""
+        self._ask(world, ("begin", world, number))
 
-    def go_on(self, world: int, copy: WorldCopy, reason: str, seconds: float) -> None:
-        """Asks for the next program; see `PlanningAway.go_on`."""
-        self._ask(world, ("go_on", world, copy, reason, seconds))
+    def go_on(self, world: int, reason: str, seconds: float) -> None:
+        """Asks for the next program; see `PlanningAway.go_on`. Its copy is kept."""
+        self._ask(world, ("go_on", world, reason, seconds))
 
     def _ask(self, world: int, request: tuple[Any, ...]) -> None:
         self.asked.add(world)
@@ -105,20 +138,19 @@ class PlanningProcesses:
         self._send(number)
 
     def _send(self, number: int) -> None:
-        """Sends a process its next requests if it has answered all others: a pipe holds less than a request, and
-        writing to one whose reader is busy blocks. There are several of them, so that it goes on planning while the
-        worlds take a step."""
+        """Sends a process its next requests if it has answered all others: writing to a pipe that is full blocks.
+        There are several of them, so that it goes on planning while the worlds take a step."""
         waiting = self._waiting[number]
         if waiting and not self._pending[number]:
             requests = [waiting.popleft() for _ in range(min(TOGETHER, len(waiting)))]
             self._pending[number] = len(requests)
             self._pipes[number].send(requests)
 
-    def answers(self, wait: bool = False) -> Iterator[tuple[int, Answer | Ig2mjError]]:
+    def answers(self, wait: float | None = 0.0) -> Iterator[tuple[int, Answer]]:
         """Worlds and their answers that are there; an error of one of them is its answer.
 
         Args:
-          wait: until there is at least one.
+          wait: s until there is at least one, at most; None: however long it takes.
 
         Raises:
           EngineError: a process has ended.
@@ -126,9 +158,10 @@ class PlanningProcesses:
         if self._here is not None:
             queue, self._queue = self._queue, []
             for request in queue:
-                yield self._took(_answer(self._here, request))
+                assert self._copies is not None
+                yield self._took(_answer(self._here, self._copies, request))
             return
-        ready = multiprocessing.connection.wait(self._pipes, None if wait and self.asked else 0.0)
+        ready = multiprocessing.connection.wait(self._pipes, wait if self.asked else 0.0)
         for number in (k for k, p in enumerate(self._pipes) if p in ready):
             for answer in self._received(number):
                 yield self._took(answer)
@@ -145,7 +178,7 @@ class PlanningProcesses:
             words = "a process that plans has ended (is there enough memory for so many?)"
             raise EngineError(words) from None
 
-    def _took(self, answer: tuple[int, Any, float]) -> tuple[int, Answer | Ig2mjError]:
+    def _took(self, answer: tuple[int, Any, float]) -> tuple[int, Answer]:
         world, found, seconds = answer
         self.asked.discard(world)
         self.seconds += seconds
@@ -168,14 +201,26 @@ class PlanningProcesses:
         self.close()
 
 
-def _answer(planning: PlanningAway, request: tuple[Any, ...]) -> tuple[int, Answer | Ig2mjError, float]:
+def _first(physics: Snapshot, states: Sequence[np.ndarray]) -> WorldCopy:
+    """A copy of the first of k worlds."""
+    return WorldCopy(jax.tree.map(lambda a: np.array(a[0]), physics), [np.array(a[:1]) for a in states])
+
+
+def _answer(planning: PlanningAway, copies: SharedCopies, request: tuple[Any, ...]) -> tuple[int, Answer, float]:
     """The number of the world, what it does next, and seconds of planning."""
     import time
 
     kind, world, *arguments = request
     began = time.process_time()
     try:
-        found: Any = getattr(planning, kind)(world, *arguments)
+        copy = copies.get(world)
+        if kind == "begin":
+            (number,) = arguments
+            plan = planning.begin(world, number, copy)
+        else:
+            reason, seconds = arguments
+            plan = planning.go_on(world, copy, reason, seconds)
+        found: Answer = plan if isinstance(plan, EpisodeResult) else Programs.pack([plan])
     except Ig2mjError as e:
         found = Ig2mjError(str(e))
     except Exception as e:  # a fault of one world ends its episode, not those of others
@@ -183,11 +228,19 @@ def _answer(planning: PlanningAway, request: tuple[Any, ...]) -> tuple[int, Answ
     return world, found, time.process_time() - began
 
 
-def _serve(pipe: multiprocessing.connection.Connection, name: str, config: EnvConfig, seed: int) -> None:
+def _serve(
+    pipe: multiprocessing.connection.Connection,
+    name: str,
+    config: EnvConfig,
+    seed: int,
+    like: WorldCopy,
+    worlds: int,
+    memory: Any,
+) -> None:
     """The work of a process, until the other end of the pipe is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    planning = planning_of(make(name, config), seed)
+    planning, copies = planning_of(make(name, config), seed), SharedCopies(like, worlds, memory)
     with contextlib.suppress(EOFError, OSError):
         while True:
             for request in pipe.recv():
-                pipe.send(_answer(planning, request))
+                pipe.send(_answer(planning, copies, request))

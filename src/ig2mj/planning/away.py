@@ -39,9 +39,10 @@ Answer = Program | EpisodeResult
 """The next program of a world, or the result of its episode."""
 
 
+@jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True, eq=False)
 class WorldCopy:
-    """A world at one time, in numpy arrays.
+    """A world at one time, in numpy arrays; a pytree.
 
     Attributes:
       physics: of it. states: leaves of its extended states, each with a world axis of length 1.

@@ -88,10 +88,12 @@ def begin(programs: Sequence[Sequence[Phase]]) -> Carry:
 
 def begin_some(carry: Carry, programs: Mapping[int, Sequence[Phase]]) -> Carry:
     """New programs in some worlds; the others go on. `programs`: by the number of the world."""
-    if not programs:
-        return carry
-    new = np.array(list(programs), np.int64)
-    fresh = Programs.pack(list(programs.values()))
+    return begin_packed(carry, list(programs), Programs.pack(list(programs.values()))) if programs else carry
+
+
+def begin_packed(carry: Carry, worlds: Sequence[int], fresh: Programs) -> Carry:
+    """As `begin_some`, with the programs of k worlds as arrays."""
+    new = np.array(worlds, np.int64)
     packed = carry.programs.with_rows(new, fresh)
     counts = (carry.phase, carry.steps, carry.still, carry.stood)
     phase, steps, still, stood = (a.copy() for a in counts)

@@ -155,6 +155,17 @@ class Programs:
             both=column(lambda p: p.both, np.int32),
         )
 
+    @classmethod
+    def together(cls, parts: Sequence[Programs]) -> Programs:
+        """Worlds of all parts, at least one, in their order. P is that of the longest program."""
+        most = max(part.base.shape[1] for part in parts)
+        found = {"length": np.concatenate([part.length for part in parts])}
+        for f in dataclasses.fields(cls):
+            if f.name != "length":
+                fill = np.nan if f.name == "rise" else 0.0
+                found[f.name] = np.concatenate([_longer(getattr(part, f.name), most, fill) for part in parts])
+        return cls(**found)
+
     def with_rows(self, worlds: Int[np.ndarray, "k"], others: Programs) -> Programs:
         """The same with the programs of `others` in k worlds. P is that of the longest program that was ever there."""
         most, ends = max(self.base.shape[1], others.base.shape[1]), others.base.shape[1]

@@ -264,7 +264,7 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
             raise EngineError(f"there is no world {world}: this engine has {self.num_worlds}")
         return jax.tree.map(np.array, self._row(fresh(physics), world))
 
-    def gather(self, physics: MjxPhysics, tree: Any, worlds: Sequence[int]) -> list[tuple[Snapshot, Any]]:
+    def gather(self, physics: MjxPhysics, tree: Any, worlds: Sequence[int]) -> tuple[Snapshot, Any]:
         """See `Engine.gather`: up to 1,024 worlds by one call and one transfer, compiled for each of `GATHERED`."""
         found: list[tuple[Snapshot, Any]] = []
         for first in range(0, len(worlds), GATHERED[-1]):
@@ -272,10 +272,9 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
             size = next(s for s in GATHERED if s >= len(chosen))
             index = np.array([*chosen, *[chosen[0]] * (size - len(chosen))], np.int32)
             rows = jax.device_get((self._row(fresh(physics), index), self._rows(tree, index)))
-            for k in range(len(chosen)):
-                one = jax.tree.map(lambda a, k=k: np.array(a[k]), rows[0])
-                found.append((one, jax.tree.map(lambda a, k=k: np.array(a[k : k + 1]), rows[1])))
-        return found
+            count = len(chosen)
+            found.append(jax.tree.map(lambda a, count=count: a[:count], rows))
+        return found[0] if len(found) == 1 else jax.tree.map(lambda *parts: np.concatenate(parts), *found)
 
     def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
         """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""

@@ -254,9 +254,11 @@ class NativeEngine(HostExecution, SceneEngine):
         """One world as a snapshot in float64 numpy arrays of its own."""
         return self._live(physics).worlds[world].save()
 
-    def gather(self, physics: NativePhysics, tree: Any, worlds: Sequence[int]) -> list[tuple[Snapshot, Any]]:
+    def gather(self, physics: NativePhysics, tree: Any, worlds: Sequence[int]) -> tuple[Snapshot, Any]:
         """See `Engine.gather`."""
-        return [(self.export(physics, w), jax.tree.map(lambda a, w=w: np.array(a[w : w + 1]), tree)) for w in worlds]
+        rows = [self.export(physics, world) for world in worlds]
+        index = np.asarray(worlds, np.int64)
+        return jax.tree.map(lambda *arrays: np.stack(arrays), *rows), jax.tree.map(lambda a: np.asarray(a)[index], tree)
 
     @functools.cached_property
     def _pieces(self) -> Pieces:
