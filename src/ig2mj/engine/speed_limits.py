@@ -1,8 +1,9 @@
-"""Limits of how fast objects may move and turn, applied after each control step.
+"""Limits of how fast objects may move and turn, applied after each physics step.
 
 Physics steps of 1/120 s cannot resolve contacts of what turns by half a radian in one: a thin object then gains energy
-with each and is thrown, at hundreds of metres a second, until its speed is no number. Other engines have such limits:
-Bullet's is a quarter of a turn in a step, PhysX's 100 rad/s by default. Robots have none here, since
+with each and is thrown, at hundreds of metres a second, until its speed is no number. Limits after each control step
+are too late: what is pressed against a pan or a wall is at 20 to 30 m/s within its four physics steps. Other engines
+have such limits: Bullet's is a quarter of a turn in a step, PhysX's 100 rad/s by default. Robots have none here, since
 their servos have their own. What moves faster than `guards.TOP_SPEED` is flagged as before. `docs/notes/lost.md`.
 """
 

@@ -158,6 +158,7 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
             data = self._mapped(mjx.step, self.model, data, physics.fields, physics.ignored)
             made = self._contacts(data), self._efc_force(data)
             forces = larger_forces(forces, *made, self.layout, self.tables, self._pyramidal)
+            data = data.replace(qvel=self._speed_limits.limited(data.qvel))
             return (data, forces, overflow | self._overflow(data), awake), None
 
         carry = (data, no_forces(self.tables, self.num_worlds), physics.overflow, self._tree_asleep(data) < 0)
@@ -168,7 +169,6 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
             carry, _ = jax.lax.scan(substep, carry, length=self.substeps)
         data, (link_force, finger_force), overflow, awake = carry
         touching = self._touching(data, physics.touching, awake)
-        data = data.replace(qvel=self._speed_limits.limited(data.qvel))
         data = self._placed(data, _poses(physics.fields))
         physics = dataclasses.replace(
             physics,

@@ -129,11 +129,12 @@ class NativeWorld:
         model, data, statics = self.model, self.data, self.statics
         mujoco.mj_step2(model, data)
         steps = [self._collect()] if statics.forces.kinds else []
+        statics.speed_limits.hold(data.qvel)
         for _ in range(len(statics.substeps) - 1):
             mujoco.mj_step(model, data)
             if steps:
                 steps.append(self._collect())
-        statics.speed_limits.hold(data.qvel)
+            statics.speed_limits.hold(data.qvel)
         mujoco.mj_step1(model, data)
         return steps
 
