@@ -41,6 +41,8 @@ def test_what_is_no_number_stays_none():
     assert np.isnan(limited[0]) and np.isnan(limited[10]) and (limited[3:9] == 0).all()
     LIMITS.hold(all_lost := np.full(12, np.nan))
     assert np.isnan(all_lost).all()
+    LIMITS.hold(infinite := np.full(12, np.inf))
+    assert np.isinf(infinite).all()
 
 
 def test_a_model_without_joints_has_none():
