@@ -8,7 +8,6 @@ import pathlib
 
 import ig2mj
 from benchmarks.harness.idle_robot import add_idle_robot, free_place
-from benchmarks.harness.made_dataset import SIZES, scene_name, write_dataset
 from benchmarks.harness.paths import WORK
 from ig2mj.scene.paths import SHIPPED_HOMES
 from ig2mj.scene.scene import Scene
@@ -38,9 +37,11 @@ class Home:
         return free_place(self.load())
 
 
-def made_homes(sizes: tuple[int, ...] = SIZES, work: pathlib.Path = WORK) -> list[Home]:
-    """The homes of `made_dataset`, converted."""
-    root = work / "dataset"
+def made_homes(sizes: tuple[int, ...] | None = None, work: pathlib.Path = WORK) -> list[Home]:
+    """The homes of `made_dataset`, converted. `sizes`: numbers of objects; None: all that it makes."""
+    from benchmarks.harness.made_dataset import SIZES, scene_name, write_dataset
+
+    root, sizes = work / "dataset", sizes or SIZES
     write_dataset(root, sizes)
     return [convert(root, scene_name(size), work) for size in sizes]
 

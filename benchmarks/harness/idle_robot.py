@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from scipy import ndimage
 
-from benchmarks.peers.pybullet_scene import BulletBody, BulletCamera
+from benchmarks.peers.bullet_description import BulletBody, BulletCamera
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.scene import Scene

@@ -28,50 +28,12 @@ from ig2mj_converters.model_task import build_model, decompose_model
 from ig2mj_converters.reading.dataset import Dataset
 from scipy.spatial.transform import Rotation
 
+from benchmarks.peers.bullet_description import BulletBody, BulletCamera, BulletScene
 from ig2mj.scene.manifest import ObjectEntry
 from ig2mj.scene.scene import Scene
 
 BUILDING = ("walls", "floors", "ceilings")
 SCENE_FILE = "bullet_scene.json"
-
-
-class BulletBody(msgspec.Struct):
-    """One URDF to load.
-
-    Attributes:
-      name: of the MJCF body that stands for it; also of its files. object: the object it belongs to.
-      pos, quat: of its base link's frame, world, metres and x-y-z-w.
-      fixed: the base does not move.
-      sleeps: ENABLE_SLEEPING; a robot never sleeps (as in iGibson).
-      joints: URDF joint -> start position. motor_force: of the velocity motor that stands for joint friction, N or N m.
-    """
-
-    name: str
-    object: str
-    urdf: str
-    urdf_with_visuals: str
-    pos: tuple[float, float, float]
-    quat: tuple[float, float, float, float]
-    fixed: bool
-    sleeps: bool = True
-    joints: dict[str, float] = {}
-    motor_force: float = FRICTION
-
-
-class BulletCamera(msgspec.Struct):
-    """Where pictures are taken from: world frame, metres; vertical view angle in degrees."""
-
-    eye: tuple[float, float, float]
-    target: tuple[float, float, float]
-    fovy: float = 90.0
-
-
-class BulletScene(msgspec.Struct):
-    """What `pybullet_worker.py` reads: paths are relative to the folder."""
-
-    name: str
-    bodies: list[BulletBody]
-    camera: BulletCamera
 
 
 def write_bullet_scene(

@@ -17,7 +17,8 @@ from benchmarks.harness.made_dataset import Item, write_dataset
 from benchmarks.harness.made_dataset import _Models as Models
 from benchmarks.harness.made_dataset import _write_scene as write_scene
 from benchmarks.peers import pybullet_process
-from benchmarks.peers.pybullet_scene import BulletCamera, write_bullet_scene, write_obj
+from benchmarks.peers.bullet_description import BulletCamera
+from benchmarks.peers.pybullet_scene import write_bullet_scene, write_obj
 from benchmarks.speed import idle_a7
 
 ROBOT_AT = (0.0, 1.8, 0.0)

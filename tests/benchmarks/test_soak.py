@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import subprocess
+import sys
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +23,13 @@ from ig2mj.engine.native.sleep import FULLY_AWAKE
 from ig2mj.worlds.random_streams import episode_keys
 
 START = (0.1, 0.25, 0.9)
+
+
+def test_homes_that_ship_are_soaked_without_the_converter():
+    """A GPU host has neither it nor what it reads files with."""
+    said = "import sys, benchmarks.soak.homes; print([m for m in sys.modules if m.startswith('ig2mj_converters')])"
+    done = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import types
 import numpy as np
 import pytest
 
-from ig2mj.planning import opening
+from ig2mj.planning import opening, opening_around
 from ig2mj.planning.joints import OPEN_TO, OpenableJoint
-from ig2mj.planning.opening import Tried, open_around, open_into
+from ig2mj.planning.opening_around import Tried, open_around, open_into
 from ig2mj.planning.spots import _shut_away
 from ig2mj.planning.steps import Step
 
@@ -47,9 +47,10 @@ def moved(monkeypatch):
             now[joint.name] = dataclasses.replace(joint, now=fraction * joint.open, vertices=corners)
             return "", ""
 
-        monkeypatch.setattr(opening, "joints_of", lambda world, name: list(now.values()))
-        monkeypatch.setattr(opening, "move_joint", move_joint)
-        monkeypatch.setattr(opening, "free_hand", lambda world, attempt: 0)
+        for module in (opening, opening_around):
+            monkeypatch.setattr(module, "joints_of", lambda world, name: list(now.values()))
+            monkeypatch.setattr(module, "move_joint", move_joint)
+            monkeypatch.setattr(module, "free_hand", lambda world, attempt: 0)
         domain = types.SimpleNamespace(opens=lambda name: True, openable=())
         facts = types.SimpleNamespace(containers=lambda name: ["cabinet"])
         com = np.array([0.25, 0.25, 0.5])

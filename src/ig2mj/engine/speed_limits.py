@@ -50,8 +50,9 @@ class SpeedLimits:
         self._group = group  # of each degree of freedom, from 1; 0: an agent's, without a limit
 
     def hold(self, qvel: Float[np.ndarray, "nv"]) -> None:
-        """Limits speeds in place; quick where none can be beyond its limit. Where one is not finite nothing is done."""
-        if min(TOP_LINEAR, TOP_ANGULAR) ** 2 < qvel.dot(qvel) < np.inf:
+        """Limits speeds in place; quick where none can be beyond its limit. Speeds that MuJoCo
+        takes for no numbers stay as they are, for it to say so in its next step."""
+        if min(TOP_LINEAR, TOP_ANGULAR) ** 2 < qvel.dot(qvel) < mujoco.mjMAXVAL**2:
             qvel[:] = self.limited(qvel)
 
     def limited(self, qvel: Float[Array, "*W nv"]) -> Float[Array, "*W nv"]:

@@ -41,7 +41,7 @@ TOGETHER = 8
 """Requests that a process gets at once, at most: a step of many worlds takes as long as it plans for some of them."""
 
 
-Answer = Programs | EpisodeResult | Ig2mjError
+PackedAnswer = Programs | EpisodeResult | Ig2mjError
 """The next program of a world, the result of its episode, or why there is neither."""
 
 
@@ -58,8 +58,7 @@ class PlanningProcesses:
     """See the module's text; a context manager.
 
     Attributes:
-      here: this process plans, when answers are asked for. count: of the processes, at least 1. asked: worlds that wait
-        for an answer.
+      count: of the processes, at least 1. asked: worlds that wait for an answer.
       seconds: processor time that processes have planned, of all of them.
     """
 
@@ -71,8 +70,7 @@ class PlanningProcesses:
         Raises:
           EngineError: the environment has no goal.
         """
-        self.here = processes == 0
-        self.env, self._seed = env, seed
+        self._env, self._seed = env, seed
         self.count = max(processes, 1)
         self.asked: set[int] = set()
         self.seconds = 0.0
@@ -83,6 +81,11 @@ class PlanningProcesses:
         self._waiting = [collections.deque[tuple[Any, ...]]() for _ in range(processes)]  # requests by process
         self._pending = [0] * processes  # answers that a process still owes
         self._copies: SharedCopies | None = None
+
+    @property
+    def here(self) -> bool:
+        """Whether this process plans, when answers are asked for."""
+        return self._here is not None
 
     def keep(self, worlds: Sequence[int], physics: Snapshot, states: Sequence[np.ndarray]) -> None:
         """Takes copies of k worlds, from which their next requests are planned. The first call starts the processes.
@@ -96,7 +99,7 @@ class PlanningProcesses:
 
     def _start(self, like: WorldCopy) -> SharedCopies:
         """Starts the processes. `like`: a copy of a world."""
-        env, count = self.env, self.env.num_worlds
+        env, count = self._env, self._env.num_worlds
         if self._here is not None:
             return SharedCopies(like, count)
         config = dataclasses.replace(env.config, worlds=1, engine="native", engine_options={}, observations=())
@@ -146,7 +149,7 @@ class PlanningProcesses:
             self._pending[number] = len(requests)
             self._pipes[number].send(requests)
 
-    def answers(self, wait: float | None = 0.0) -> Iterator[tuple[int, Answer]]:
+    def answers(self, wait: float | None = 0.0) -> Iterator[tuple[int, PackedAnswer]]:
         """Worlds and their answers that are there; an error of one of them is its answer.
 
         Args:
@@ -178,7 +181,7 @@ class PlanningProcesses:
             words = "a process that plans has ended (is there enough memory for so many?)"
             raise EngineError(words) from None
 
-    def _took(self, answer: tuple[int, Any, float]) -> tuple[int, Answer]:
+    def _took(self, answer: tuple[int, Any, float]) -> tuple[int, PackedAnswer]:
         world, found, seconds = answer
         self.asked.discard(world)
         self.seconds += seconds
@@ -206,7 +209,7 @@ def _first(physics: Snapshot, states: Sequence[np.ndarray]) -> WorldCopy:
     return WorldCopy(jax.tree.map(lambda a: np.array(a[0]), physics), [np.array(a[:1]) for a in states])
 
 
-def _answer(planning: PlanningAway, copies: SharedCopies, request: tuple[Any, ...]) -> tuple[int, Answer, float]:
+def _answer(planning: PlanningAway, copies: SharedCopies, request: tuple[Any, ...]) -> tuple[int, PackedAnswer, float]:
     """The number of the world, what it does next, and seconds of planning."""
     import time
 
@@ -220,7 +223,7 @@ def _answer(planning: PlanningAway, copies: SharedCopies, request: tuple[Any, ..
         else:
             reason, seconds = arguments
             plan = planning.go_on(world, copy, reason, seconds)
-        found: Answer = plan if isinstance(plan, EpisodeResult) else Programs.pack([plan])
+        found: PackedAnswer = plan if isinstance(plan, EpisodeResult) else Programs.pack([plan])
     except Ig2mjError as e:
         found = Ig2mjError(str(e))
     except Exception as e:  # a fault of one world ends its episode, not those of others

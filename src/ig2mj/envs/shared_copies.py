@@ -22,7 +22,7 @@ ALIGNED = 64
 
 
 class SharedCopies:
-    """See the module's text. Whoever reads a place makes sure that nobody writes to it at that time.
+    """See the module's text. Reading and writing a place must not overlap.
 
     Attributes:
       like: a copy of a world, whose arrays have the shapes and types of all. memory: bytes that hold all copies.

@@ -38,7 +38,7 @@ from ig2mj.planning.moves import (
     travel,
     vector3,
 )
-from ig2mj.planning.opening import Tried, bars, open_around
+from ig2mj.planning.opening_around import Tried, bars, open_around
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.placing import bring_out
 from ig2mj.planning.steps import Outcome, Step

@@ -33,7 +33,7 @@ from ig2mj.planning.moves import (
     tries_left,
     vector3,
 )
-from ig2mj.planning.opening import Tried, open_around
+from ig2mj.planning.opening_around import Tried, open_around
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.stances import reaching_all, stances
 from ig2mj.planning.steps import Outcome, Step

@@ -39,7 +39,8 @@ from ig2mj.planning.moves import (
     turning_point,
     vector3,
 )
-from ig2mj.planning.opening import Tried, is_shut, open_into, withdraw
+from ig2mj.planning.opening import withdraw
+from ig2mj.planning.opening_around import Tried, is_shut, open_into
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.spots import Spot, ends_down, grip_for, is_tipped, put_there, spots_for, spots_upon
 from ig2mj.planning.stances import stances

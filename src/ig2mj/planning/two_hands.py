@@ -35,7 +35,7 @@ from ig2mj.planning.moves import (
     travel,
     vector3,
 )
-from ig2mj.planning.opening import Tried, open_around
+from ig2mj.planning.opening_around import Tried, open_around
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.spots import Spot, grip_for, put_there, spots_for
 from ig2mj.planning.stances import reaching_with
