@@ -39,6 +39,9 @@ MOST_JOBS = 4
 FEWEST_SECONDS = 45.0
 """A case is not begun with less time than this left."""
 
+README_LIMIT = 480.0
+"""s that a case of README.md may take, which waits for others to be timed while it holds what it has compiled."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Job:
@@ -135,12 +138,12 @@ def readme_rows(homes: dict[str, str], out: pathlib.Path) -> list[Job]:
 
     def batch(home: str, worlds: int, *what: str, engine: str = "ig2mj") -> Job:
         words = (*module("speed.batch"), homes[home], "--worlds", str(worlds), "--what", *what)
-        return Job("-".join([home, *what, engine]), (*words, "--engine", engine, *common))
+        return Job("-".join([home, *what, engine]), (*words, "--engine", engine, *common), README_LIMIT)
 
     def cooking(*observations: str) -> Job:
         words = [*module("speed.environments"), "CookingMeat", "--worlds", "4096"]
         words += ["--observations", *observations] if observations else []
-        return Job("-".join(["cooking", *observations]), (*words, *common))
+        return Job("-".join(["cooking", *observations]), (*words, *common), README_LIMIT)
 
     return [
         batch("birch", 8192, "physics", "full"),
