@@ -71,6 +71,10 @@ class Compiled:
     """`jax.jit` of a function, traced and lowered while the collector is paused, large constants passed as arguments
     (`ig2mj.process.large_constants`). Offers what `jax.jit` offers.
 
+    Arrays of donated arguments that the function does not read are kept as arguments. JAX leaves them out, and what a
+    call returns in their place lies elsewhere after every call. XLA puts other arrays there before, and Warp captures
+    a CUDA graph again for each place (`ig2mj.engine.warp.patches.graphs`).
+
     For programs of a millisecond or more: each call costs half a microsecond extra.
     """
 
@@ -83,6 +87,8 @@ class Compiled:
         import jax
 
         whole = options.keys() - {"donate_argnums"}
+        if "donate_argnums" in options:
+            options["keep_unused"] = True
         self._compiled: Any = jax.jit(function, **options) if whole else WithLargeConstants(function, **options)
         self._check = check
 
