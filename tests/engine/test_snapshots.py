@@ -43,7 +43,7 @@ def test_one_of_the_bare_scene_leaves_the_hand_at_its_start(full, bare):
 def test_gathered_worlds_are_those_that_are_exported_one_by_one(full):
     physics, _ = full.run(full.fresh(), 10, np.array([[0.2, 0, 0], [0, 0.1, 0]], np.float32))
     tree = {"volume": np.arange(6, dtype=np.float32).reshape(2, 3)}
-    rows, volumes = full.engine.gather(physics, tree, [1, 0, 1])
+    rows, volumes = full.engine.gather(physics, tree, [1, 0, 1])()
     for k, world in enumerate([1, 0, 1]):
         assert_same(jax.tree.map(lambda a, k=k: np.asarray(a[k]), rows), full.engine.export(physics, world))
     np.testing.assert_array_equal(volumes["volume"], tree["volume"][[1, 0, 1]])

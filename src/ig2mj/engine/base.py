@@ -294,8 +294,8 @@ class Engine(Protocol):
         """One world as a snapshot without the world axis, in numpy arrays that share no memory with the engine."""
         ...
 
-    def gather(self, physics: Physics, tree: Any, worlds: Sequence[int]) -> tuple[Snapshot, Any]:
-        """Some worlds on the host.
+    def gather(self, physics: Physics, tree: Any, worlds: Sequence[int]) -> Callable[[], tuple[Snapshot, Any]]:
+        """Begins to copy some worlds to the host.
 
         Args:
           physics: as returned by the last call.
@@ -303,7 +303,8 @@ class Engine(Protocol):
           worlds: numbers of k of them, at least one.
 
         Returns:
-          their snapshots, and rows of the tree, in numpy arrays [k, ...] of their own.
+          a function that waits for their snapshots, and rows of the tree, and returns them in numpy arrays [k, ...] of
+          their own. The next step may begin before it is called.
         """
         ...
 

@@ -7,7 +7,8 @@
 All worlds take an agent step together, in one call. Programs of all worlds are followed in one batch on the host
 (`ig2mj.planning.execution`). A world whose program has ended is copied to the process that plans for it, holds still
 until the answer is there, and delays no other world. Copies of several worlds leave the device together
-(`Engine.gather`), in batches of `GATHERED`, so that nothing is compiled again. Answers are read while the device steps.
+(`Engine.gather`), in batches of `GATHERED`, so that nothing is compiled again. They are handed over, and answers are
+read, while the device takes the next step.
 
 Axes: W worlds.
 """
@@ -15,14 +16,17 @@ Axes: W worlds.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import jax
 import numpy as np
 
 from ig2mj.engine.base import GATHERED
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.planning_processes import PlanningProcesses
@@ -63,8 +67,9 @@ class Spent:
 
     Attributes:
       stepping: s in the environment's step, until its results are there. following: s in which programs are followed,
-        and answers read while the environment does not step. copying: s in which worlds are copied. blocked: s in which
-        no world had a program.
+        and answers read while the environment does not step. copying: s in which worlds are copied while the
+        environment does not step; where the step has ended when copies have been handed over, all the time of that.
+        blocked: s in which no world had a program.
       world_steps: agent steps of all worlds. waited: of these, those in which a world held still for its planner.
       planned: processor s of all processes. programs: that were planned.
     """
@@ -155,11 +160,11 @@ class PlannedBatch:
         count = self.env.num_worlds
         world = self.stage.state.batch.world
         for size in (s for s in GATHERED if s <= max(count, 1)):
-            self.env.core.engine.gather(world.physics, world.states, range(size))
+            self.env.core.engine.gather(world.physics, world.states, range(size))()
         self.stage.act(np.zeros((count, self.body.size), np.float32))
         self.stage.observe(self.env.reset(self.stage.state, np.ones(count, bool)))
         every = range(min(count, self.planners.count))
-        self.keep(every)
+        self.keep(every, self.gather(every))
         for number in every:
             self.planners.begin(number, number)
         while self.planners.asked:
@@ -167,12 +172,15 @@ class PlannedBatch:
                 pass
         self.planners.seconds = 0.0
 
-    def keep(self, worlds: Sequence[int]) -> None:
-        """Copies some worlds for who plans for them."""
-        if worlds:
-            world = self.stage.state.batch.world
-            physics, states = self.env.core.engine.gather(world.physics, world.states, worlds)
-            self.planners.keep(worlds, physics, jax.tree.leaves(states))
+    def gather(self, worlds: Sequence[int]) -> Callable[[], tuple[Snapshot, Any]]:
+        """Begins to copy some worlds to the host; see `Engine.gather`."""
+        world = self.stage.state.batch.world
+        return self.env.core.engine.gather(world.physics, world.states, worlds)
+
+    def keep(self, worlds: Sequence[int], copies: Callable[[], tuple[Snapshot, Any]]) -> None:
+        """Hands copies of some worlds, which `gather` began, to who plans for them."""
+        physics, states = copies()
+        self.planners.keep(worlds, physics, jax.tree.leaves(states))
 
     def close(self) -> None:
         """Ends the processes that plan; may be called twice."""
@@ -197,6 +205,8 @@ class _Episodes:
         self.over: list[int] = []  # worlds whose episodes are over
         self.stopped: list[int] = []  # of these, the ones whose programs still go on
         self.fresh: dict[int, Programs] = {}  # of worlds whose programs begin with the next step
+        self.leaving: list[_Leaving] = []  # copies that have not been handed over
+        self.parting: set[int] = set()  # worlds that these are of
         self.steps, self.begun = np.zeros(count, int), np.zeros(count, int)
         self.results: dict[int, EpisodeResult | Ig2mjError] = {}
         self.found: list[PlannedEpisode] = []
@@ -216,7 +226,7 @@ class _Episodes:
             if self._answers():
                 self._step()
             room = max(1, self.env.num_worlds // REFILL)
-            free = [w for w in self.over if w not in self.planners.asked]
+            free = [w for w in self.over if not self._waits(w)]
             if begun < episodes and (len(free) >= room or not self.numbers):
                 new = {world: begun + k for k, world in enumerate(free[: episodes - begun])}
                 self.over = [w for w in self.over if w not in new]
@@ -233,12 +243,29 @@ class _Episodes:
         worlds = sorted(numbers)
         self.numbers |= numbers
         self.carry = execution.begin_some(self.carry, {world: [] for world in worlds})
-        self.batch.keep(worlds)
         for world in worlds:
             self.results.pop(world, None)
             self.steps[world] = 0
-            self.planners.begin(world, numbers[world])
+        self._leave(worlds, [functools.partial(self.planners.begin, world, numbers[world]) for world in worlds])
         self.spent.copying += time.perf_counter() - began
+
+    def _leave(self, worlds: Sequence[int], ask: Sequence[Callable[[], None]]) -> None:
+        """Copies worlds for their planners. `ask`: requests of these worlds, made when the copies are handed over."""
+        if worlds:
+            self.leaving.append(_Leaving(worlds, self.batch.gather(worlds), ask))
+            self.parting.update(worlds)
+
+    def _hand_over(self) -> None:
+        for each in self.leaving:
+            self.batch.keep(each.worlds, each.copies)
+            for ask in each.ask:
+                ask()
+        self.leaving.clear()
+        self.parting.clear()
+
+    def _waits(self, world: int) -> bool:
+        """Whether a world's planner has been asked, or is about to be."""
+        return world in self.planners.asked or world in self.parting
 
     def _ended(self, world: int, success: bool, why: str) -> None:
         number, result = self.numbers.pop(world), self.results.get(world)
@@ -253,6 +280,10 @@ class _Episodes:
 
     def _answers(self) -> bool:
         """Takes the planners' answers; whether a step can be taken: some world has a program."""
+        began = time.perf_counter()
+        if self.planners.here or not self.carry.running.any():
+            self._hand_over()
+        self.spent.copying += time.perf_counter() - began
         began = time.perf_counter()
         idle = all(world in self.planners.asked for world in self.numbers)
         self._take(None if idle else 0.0)
@@ -296,23 +327,34 @@ class _Episodes:
         began = time.perf_counter()
         self.steps += 1
         spent.world_steps += len(self.numbers)
-        spent.waited += sum(world in self.planners.asked for world in self.numbers)
+        spent.waited += sum(self._waits(world) for world in self.numbers)
         stage.act(action)
+        stepped = time.perf_counter()
+        self._hand_over()
+        late = time.perf_counter() - stepped if _is_there(stage.state.terminated) else 0.0
         while self.planners.asked and not self.planners.here and not _is_there(stage.state.terminated):
             self._take(LISTENING)
         terminated, truncated = np.asarray(stage.state.terminated), np.asarray(stage.state.truncated)
-        spent.stepping += time.perf_counter() - began
-        began = time.perf_counter()
+        spent.stepping += time.perf_counter() - began - late
+        began = time.perf_counter() - late
         for world in sorted(self.numbers):
             if terminated[world] or truncated[world]:
                 self._ended(world, bool(terminated[world]), stage.ended(world) or "")
         self._set_programs()
         ended = [w for w in sorted(self.numbers) if not self.carry.running[w] and w not in self.planners.asked]
-        self.batch.keep(ended)
-        for world in ended:
-            seconds = float((self.steps[world] - self.begun[world]) * self.env.period)
-            self.planners.go_on(world, self.carry.reason(world), seconds)
+        seconds = (self.steps - self.begun) * self.env.period
+        asks = [functools.partial(self.planners.go_on, w, self.carry.reason(w), float(seconds[w])) for w in ended]
+        self._leave(ended, asks)
         spent.copying += time.perf_counter() - began
+
+
+@dataclasses.dataclass(frozen=True)
+class _Leaving:
+    """Worlds that are on their way to the host, and requests that are made when they are there."""
+
+    worlds: Sequence[int]
+    copies: Callable[[], tuple[Snapshot, Any]]
+    ask: Sequence[Callable[[], None]]
 
 
 def _is_there(array: Array) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import abc
 import copy
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
@@ -264,17 +264,23 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
             raise EngineError(f"there is no world {world}: this engine has {self.num_worlds}")
         return jax.tree.map(np.array, self._row(fresh(physics), world))
 
-    def gather(self, physics: MjxPhysics, tree: Any, worlds: Sequence[int]) -> tuple[Snapshot, Any]:
-        """See `Engine.gather`: up to 1,024 worlds by one call and one transfer, compiled for each of `GATHERED`."""
-        found: list[tuple[Snapshot, Any]] = []
+    def gather(self, physics: MjxPhysics, tree: Any, worlds: Sequence[int]) -> Callable[[], tuple[Snapshot, Any]]:
+        """See `Engine.gather`: up to 1,024 worlds by one call, compiled for each of `GATHERED`."""
+        begun: list[tuple[int, Any]] = []
         for first in range(0, len(worlds), GATHERED[-1]):
             chosen = list(worlds[first : first + GATHERED[-1]])
             size = next(s for s in GATHERED if s >= len(chosen))
             index = np.array([*chosen, *[chosen[0]] * (size - len(chosen))], np.int32)
-            rows = jax.device_get((self._row(fresh(physics), index), self._rows(tree, index)))
-            count = len(chosen)
-            found.append(jax.tree.map(lambda a, count=count: a[:count], rows))
-        return found[0] if len(found) == 1 else jax.tree.map(lambda *parts: np.concatenate(parts), *found)
+            rows = self._row(fresh(physics), index), self._rows(tree, index)
+            for array in jax.tree.leaves(rows):
+                array.copy_to_host_async()
+            begun.append((len(chosen), rows))
+
+        def finish() -> tuple[Snapshot, Any]:
+            found = [jax.tree.map(lambda a, count=count: a[:count], jax.device_get(rows)) for count, rows in begun]
+            return found[0] if len(found) == 1 else jax.tree.map(lambda *parts: np.concatenate(parts), *found)
+
+        return finish
 
     def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
         """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""

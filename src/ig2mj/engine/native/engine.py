@@ -254,11 +254,15 @@ class NativeEngine(HostExecution, SceneEngine):
         """One world as a snapshot in float64 numpy arrays of its own."""
         return self._live(physics).worlds[world].save()
 
-    def gather(self, physics: NativePhysics, tree: Any, worlds: Sequence[int]) -> tuple[Snapshot, Any]:
-        """See `Engine.gather`."""
-        rows = [self.export(physics, world) for world in worlds]
+    def gather(self, physics: NativePhysics, tree: Any, worlds: Sequence[int]) -> Callable[[], tuple[Snapshot, Any]]:
+        """See `Engine.gather`: copied at once."""
+        every = [self.export(physics, world) for world in worlds]
         index = np.asarray(worlds, np.int64)
-        return jax.tree.map(lambda *arrays: np.stack(arrays), *rows), jax.tree.map(lambda a: np.asarray(a)[index], tree)
+        rows = (
+            jax.tree.map(lambda *arrays: np.stack(arrays), *every),
+            jax.tree.map(lambda a: np.asarray(a)[index], tree),
+        )
+        return lambda: rows
 
     @functools.cached_property
     def _pieces(self) -> Pieces:
