@@ -187,3 +187,18 @@ def test_resets_inside_a_program_put_flagged_worlds_right(batch_of_many, pushing
     np.testing.assert_array_equal(flagged, expected)
     assert batch_of_many.metrics(batch)["fell"] == WORLDS // 8
     assert np.isfinite(np.asarray(batch.world.view.object_pos)).all()
+
+
+def test_an_environment_that_is_stepped_from_python_captures_no_graphs(gpu):
+    """Arrays that lay elsewhere after each step cost four captures a step, seven times the step itself."""
+    pytest.importorskip("warp")
+    from benchmarks.harness.captures import Counts
+
+    counts, env = Counts(), ig2mj.make("CookingMeat", worlds=64, engine="warp", pool_size=4)
+    state, action = env.reset(0), np.zeros((64, *env.action_space.shape), np.float32)
+    for _ in range(10):
+        state = env.step(state, action)
+    before = counts.now()[0]
+    for _ in range(10):
+        state = env.step(state, action)
+    assert counts.now()[0] == before
