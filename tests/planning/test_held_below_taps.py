@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from ig2mj.planning import grasping, taps
+from ig2mj.planning.holding import SPREAD, STANCES, farther_ones
 from ig2mj.planning.steps import Outcome
-from ig2mj.planning.world import HANGS, HIGHEST, RAISED, TALL, PlannedWorld
+from ig2mj.planning.world import HANGS, HIGHEST, RAISED, TALL, PlannedWorld, Stance
 
 GRIP = np.array([0.5, 0.0, 0.9])
 
@@ -171,3 +172,13 @@ def test_what_is_put_down_for_a_free_hand_is_taken_again_whatever_came_of_it(mon
         while True:
             next(running)
     assert ended.value.value is opened and world.held == ["rag"]
+
+
+def test_farther_stances_are_spread_out_and_leave_the_nearest_ones_out():
+    nearest = [Stance((0.12 * k, 0.0), 0.0) for k in range(STANCES)]
+    others = [Stance((0.12 * k, 0.0), 0.0) for k in range(STANCES, 24)]
+    found = list(farther_ones([*nearest, *others]))
+    assert found and not set(found) & set(nearest)
+    apart = [abs(a.xy[0] - b.xy[0]) for a in found for b in (*nearest, *found) if a is not b]
+    assert min(apart) >= SPREAD
+    assert max(s.xy[0] for s in found) > max(s.xy[0] for s in others) - SPREAD, "to the other side"

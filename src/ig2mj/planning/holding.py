@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -76,14 +76,15 @@ def hold_at(
     for _ in range(ATTEMPTS):
         obstacles, floor, now = world.obstacles([name], stays=False), world.floor(), world.base[1]
 
-        def candidates(floor=floor, now=now) -> Iterator[_Holding]:
+        def candidates(around: bool = False, floor=floor, now=now) -> Iterator[_Holding]:
             for hold in holds():
                 held = about_vertical(-now) @ hold.offset
                 here = world.stance  # a base on wheels that stands near enough stays there
                 near = not world.body.sideways and world.reaches(hand, here, hold.point + hold.offset)
-                if near and (here.xy, hold.number) not in missed and suits(here, hold):
+                if near and not around and (here.xy, hold.number) not in missed and suits(here, hold):
                     yield here, hold
-                for stance in stances(world, hand, hold.point, floor, AWAY, STANCES, held):
+                found = stances(world, hand, hold.point, floor, AWAY, ALL_AROUND if around else STANCES, held)
+                for stance in farther_ones(found) if around else found:
                     if (stance.xy, hold.number) not in missed and suits(stance, hold):
                         yield stance, hold
 
@@ -111,6 +112,8 @@ def hold_at(
 
         most = WAYS if world.body.opening is None else ARM_WAYS
         found: _Holding | None = first_way(filter(has_room, candidates()), has_way, most)
+        if found is None and world.body.opening is None:
+            found = first_way(filter(has_room, candidates(around=True)), has_way, most)
         if found is None:
             return "no_path", [], -1
         stance, hold = found
@@ -152,8 +155,23 @@ def _spheres(world: PlannedWorld, name: str, hand: int, rotation: Rotation) -> n
     return world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
 
 
+def farther_ones(found: Iterable[Stance]) -> Iterator[Stance]:
+    """Those of some stances that are `SPREAD` from each other and from the first `STANCES`, which are left out."""
+    seen = list[Stance]()
+    for number, stance in enumerate(found):
+        if number >= STANCES:
+            if any(np.linalg.norm(np.subtract(stance.xy, s.xy)) < SPREAD for s in seen):
+                continue
+            yield stance
+        seen.append(stance)
+
+
 _Holding = tuple[Stance, Hold]
 """Where the robot stands, and how it holds what it holds."""
 
 STANCES, WAYS, ARM_WAYS = 4, 60, 240
 """Stances for each point, and ways of a hand that are looked for, at most: of one that floats, and of one on an arm."""
+
+ALL_AROUND, SPREAD = 60, 0.25
+"""Stances for each point that are looked at where the hand has no way from the nearest ones, and m between those that
+are tried then."""
