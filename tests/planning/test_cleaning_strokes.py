@@ -10,11 +10,13 @@ from ig2mj.planning.cleaning_strokes import (
     FIRST,
     PRESSED,
     SHIFTED_TURNS,
+    SPREAD,
     HeldTool,
     Region,
     Stroke,
     one_after_another,
     regions_of,
+    spread,
     turn_about,
 )
 from ig2mj.planning.tool_areas import is_hidden
@@ -117,6 +119,12 @@ def test_what_stands_next_to_a_particle_leaves_room_for_a_tool_that_is_shifted()
     spot = DirtSpot(0, np.zeros(3), UP)
     reach = [region.box(region.at(spot))[1][0] for region in regions_of(held_rag(), 0.0, UP)]
     assert reach[0] > wall and min(reach) < wall
+
+
+def test_stances_are_looked_for_in_front_of_each_face_with_particles():
+    near, far = DirtSpot(0, np.zeros(3), UP), DirtSpot(1, np.array([0.5 * SPREAD, 0.0, 0.0]), UP)
+    other, side = DirtSpot(2, np.array([2 * SPREAD, 0.0, 0.0]), UP), DirtSpot(3, np.zeros(3), np.array([1.0, 0.0, 0.0]))
+    assert spread([near, far, other, side]) == [near, other, side]
 
 
 def test_a_cleaning_area_inside_of_its_tool_is_hidden(tiny_home):

@@ -61,8 +61,13 @@ def test_a_gripper_is_behind_a_cloth_that_it_is_to_clean_a_floor_with(monkeypatc
     assert cleaning_area.is_behind(world, "broom", world.palm), "what is not flat is held anyhow"
 
 
-def test_a_cloth_that_is_held_askew_is_let_go_and_taken_again_before_it_is_given_up(monkeypatch):
-    world, turned = object.__new__(World), []
+@pytest.mark.parametrize(
+    ("opening", "action"), [(0.1, "_turned_over"), (None, "hand_over_in_the_open")], ids=["gripper", "floating hand"]
+)
+def test_a_cloth_that_is_held_askew_is_taken_from_behind_before_it_is_given_up(monkeypatch, opening, action):
+    """A gripper lets it fall and takes it again; a hand that floats gives it to the other hand."""
+    world, turned, planned = object.__new__(World), [], []
+    world.body = types.SimpleNamespace(opening=opening)
     left = [2]
 
     def turned_over(world, tool, hand):
@@ -71,10 +76,13 @@ def test_a_cloth_that_is_held_askew_is_let_go_and_taken_again_before_it_is_given
         left[0] -= 1
         return True
 
+    def plan_strokes(*_, around=False):
+        planned.append(around)
+
     never = lambda *_: False  # noqa: E731
     changes = {
         "is_covered": never, "is_behind": lambda *_: left[0] == 0, "hand_with": lambda *_: 0,
-        "_turned_over": turned_over, "plan_strokes": lambda *_: None, "strayed": never,
+        action: turned_over, "plan_strokes": plan_strokes, "strayed": never,
         "go_home_past": lambda *_: iter(()), "bars": never,
     }  # fmt: skip
     for name, change in changes.items():
@@ -87,3 +95,4 @@ def test_a_cloth_that_is_held_askew_is_let_go_and_taken_again_before_it_is_given
         while True:
             next(running)
     assert turned == ["cloth", "cloth"] and ended.value.value.reason == "no_base"
+    assert planned[:3] == [False] * 3 and planned[3:] == [True] * (opening is None), "from all around at last"

@@ -25,7 +25,7 @@ from ig2mj.planning.cleaning_strokes import (
 )
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp, held_again, put_down_others, with_free_hand
-from ig2mj.planning.handing_over import hand_over
+from ig2mj.planning.handing_over import hand_over_in_the_open
 from ig2mj.planning.moves import (
     UP,
     Primitive,
@@ -59,8 +59,8 @@ BESIDE, MOVED = 0.12, 4
 """m from dirt within which things are moved away where no tool reaches it, and how many at most."""
 
 TURNED, RETAKEN = 2, 4
-"""Times that a gripper turns over a tool which lies with the side up that cleans, and these together with those that it
-lets it fall to take it from behind."""
+"""Times that a gripper turns over a tool which lies with the side up that cleans, or that a hand which floats gives one
+to the other hand; and these together with those that a gripper lets it fall to take it from behind."""
 
 REGRASPS = 8
 """Times that a tool which was lost is taken again."""
@@ -88,10 +88,11 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 again = None if lost > REGRASPS else (yield from grasp(world, Step("grasp", (tool,))))
                 if again is None or not again.done:
                     return Outcome("slipped", f"the hand lost {tool}", attempts=attempt + 1)
+                visited.clear()  # it is held in another way
             hand = hand_with(world, tool)
             if world.body.opening is None and is_covered(world, tool, hand):
                 yield from put_down_others(world, tool)
-                if failed := (yield from hand_over(world, tool, hand)):
+                if failed := (yield from hand_over_in_the_open(world, tool, hand)):
                     reason, detail = failed, f"{tool} cannot be taken by the side that does not clean"
                     continue
                 hand = hand_with(world, tool)
@@ -102,16 +103,26 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 hand = hand_with(world, tool)
             spots = [spot for spot in world.dirt(predicate, name) if tried[spot.number] < TRIES]
             spots.sort(key=lambda spot: tried[spot.number])
-            plan = plan_strokes(world, name, tool, hand, spots, visited)
+            plan, floats = plan_strokes(world, name, tool, hand, spots, visited), world.body.opening is None
+            if plan is None and floats and turned < TURNED and _is_askew(world, tool):
+                turned += 1
+                visited.clear()
+                yield from put_down_others(world, tool)
+                yield from hand_over_in_the_open(world, tool, hand)
+                continue
             while plan is None and (yield from _opened(world, name, tool, opened)) and tool in world.held:
                 plan = plan_strokes(world, name, tool, hand, spots, visited)
             while plan is None and (yield from _clear_away(world, name, tool, spots, moved)) and tool in world.held:
                 plan = plan_strokes(world, name, tool, hand, spots, ())
-            if plan is None and turned < RETAKEN and _is_askew(world, tool):
+            if plan is None and not floats and turned < RETAKEN and _is_askew(world, tool):
                 turned += 1
                 if not (yield from _turned_over(world, tool, hand_with(world, tool))):
                     return Outcome("slipped", f"{tool} was put down to be taken from behind", attempts=attempt + 1)
                 continue
+            if plan is None and tool not in world.held:
+                continue  # it was lost meanwhile
+            if plan is None and floats:
+                plan = plan_strokes(world, name, tool, hand, spots, visited, around=True)
             if plan is None:
                 break
             if strayed(world, hand):
@@ -148,8 +159,8 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
 
 
 def _is_askew(world: PlannedWorld, tool: str) -> bool:
-    """Whether a gripper holds a tool, and not from behind."""
-    if world.body.opening is None or tool not in world.held:
+    """Whether a hand holds a tool, and not from behind: by its rim it is in the way of the side that cleans."""
+    if tool not in world.held:
         return False
     return not is_behind(world, tool, world.hand_axes(hand_with(world, tool))[1])
 
@@ -205,7 +216,7 @@ def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Progr
     """Presses the tool on a particle and lifts it; nothing where the hand has no way there. The planned turn of the
     tool is tried first."""
     obstacles, stance, spot = world.obstacles([tool], world.stance), world.stance, stroke.spot
-    held = HeldTool(world, tool, hand)
+    held = HeldTool(world, tool, hand, stroke.share)
     regions = regions_of(held, stance.yaw, spot.normal)
     planned = regions[min(stroke.turn, len(regions) - 1)]
     if world.body.opening is not None:

@@ -76,6 +76,16 @@ ASKED = 3
 ELSEWHERE = 0.12
 """m between stances from which an object is cleaned."""
 
+ALL_AROUND, SPREAD = 60, 0.25
+"""Stances for each particle that are looked at where the nearest ones do not do, and m between those that are tried."""
+
+LITTLE = 0.6
+"""Share of the radii of hand and tool that needs room there."""
+
+ALIKE, LEVEL = 0.9, 0.5
+"""Cosine of the angle between normals of the same face; z of the normal of a face that one stands in front of, at
+most."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Region:
@@ -144,13 +154,14 @@ class HeldTool:
 
     flat: Vector | None = None
 
-    def __init__(self, world: PlannedWorld, tool: str, hand: int):
-        self.world, self.tool, self.hand = world, tool, hand
+    def __init__(self, world: PlannedWorld, tool: str, hand: int, share: float = 1.0):
+        """`share`: of the spheres' radii that need room."""
+        self.world, self.tool, self.hand, self.share = world, tool, hand, share
         area, self.out = cleaning_area(world, tool)
         self.has_area = area is not None
         self.whole = world.vertices(tool) - world.grip(hand)
         self.corners = self.whole if area is None else area - world.grip(hand)
-        self._spheres = world.spheres(*world.hand_axes(hand), holding=tool, hand=hand)
+        self._spheres = world.spheres(*world.hand_axes(hand), holding=tool, hand=hand) * (1.0, 1.0, 1.0, share)
         self.flat = None if self.has_area else _flat_side(self.whole)
 
     def spheres(self, rotation: Rotation) -> Float[np.ndarray, "S 4"]:
@@ -245,12 +256,14 @@ class Stroke:
     """A particle that a tool is pressed on, the number of its turn, and all particles that it takes off there.
 
     `roofed`: it is on a loose thing with something before the face, so that the tool easily pushes the thing over.
+    `share`: of the radii of hand and tool that has room there.
     """
 
     spot: DirtSpot
     turn: int
     covered: list[DirtSpot]
     roofed: bool = False
+    share: float = 1.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -271,21 +284,35 @@ class StrokePlan:
 
 
 def plan_strokes(
-    world: PlannedWorld, name: str, tool: str, hand: int, spots: Sequence[DirtSpot], visited: Sequence[Stance]
+    world: PlannedWorld,
+    name: str,
+    tool: str,
+    hand: int,
+    spots: Sequence[DirtSpot],
+    visited: Sequence[Stance],
+    around: bool = False,
 ) -> StrokePlan | None:
-    """The stance from which most particles are in reach, of those near the nearest ones that were not visited."""
+    """The stance from which most particles are in reach, of those near the nearest ones that were not visited.
+
+    Args:
+      around: of those all around the object, in front of each of its faces that has particles; there hand and tool
+        may touch what is next to them.
+    """
     floor, obstacles = world.floor(), world.obstacles([tool], stays=False)
     spots = [s for s in spots if s.normal[2] > LOWEST]
     axes = world.hand_axes(hand)
     away = world.away(world.spheres(*axes, holding=tool, hand=hand), axes[1])
-    held, loose = HeldTool(world, tool, hand), not world.domain.fixed(name)
+    held, loose = HeldTool(world, tool, hand, LITTLE if around else 1.0), not world.domain.fixed(name)
     best: StrokePlan | None = None
     seen = [*visited]
     looked, enough = 0, min(ENOUGH, len(spots))
-    for aim in spots:
+    aims, most, apart = (spread(spots), ALL_AROUND, SPREAD) if around else (spots, STANCES, ELSEWHERE)
+    for aim in aims:
         known = len(seen)
-        for stance in stances(world, hand, aim.pos + PRESSED * aim.normal, floor, away, STANCES):
-            if any(np.linalg.norm(np.subtract(stance.xy, v.xy)) < ELSEWHERE for v in seen):
+        before = (aim.pos, aim.normal) if around and abs(aim.normal[2]) < LEVEL else None
+        for stance in stances(world, hand, aim.pos + PRESSED * aim.normal, floor, away, most, before=before):
+            near = [np.linalg.norm(np.subtract(stance.xy, v.xy)) for v in seen]
+            if min(near[: len(visited)], default=np.inf) < ELSEWHERE or min(near, default=np.inf) < apart:
                 continue
             seen.append(stance)
             plan = _From(held, stance, obstacles, loose).plan(spots)
@@ -294,9 +321,18 @@ def plan_strokes(
             if best is not None and best.worth >= enough:
                 return best
         looked += len(seen) > known
-        if looked == NEAREST:
+        if looked == NEAREST and not around:
             break
     return best
+
+
+def spread(spots: Sequence[DirtSpot]) -> list[DirtSpot]:
+    """Particles of which none looks where one before it does that is less than `SPREAD` away."""
+    found = list[DirtSpot]()
+    for spot in spots:
+        if not any(f.normal @ spot.normal > ALIKE and np.linalg.norm(f.pos - spot.pos) < SPREAD for f in found):
+            found.append(spot)
+    return found
 
 
 class _From:
@@ -333,9 +369,8 @@ class _From:
             best = int(np.argmax(np.where(left, covers.sum(1) - HIDDEN * roofed, -np.inf)))
             own = covers[best] & ~taken
             spot = spots[near[best]]
-            strokes.append(
-                Stroke(spot, int(turns[near[best]]), [spots[k] for k in np.flatnonzero(own)], bool(roofed[best]))
-            )
+            covered = [spots[k] for k in np.flatnonzero(own)]
+            strokes.append(Stroke(spot, int(turns[near[best]]), covered, bool(roofed[best]), self._held.share))
             taken |= own
             left &= ~covers[best][near]
         strokes = one_after_another(strokes)
