@@ -69,7 +69,8 @@ FIRM = 8
 
 POSES, WAYS, ARM_POSES, ARM_WAYS = 6, 120, 24, 720
 """Poses that are tried from a stance, and ways of a hand that are looked for, at most, and those of a gripper on an
-arm, which has a posture for few of the poses that fit its object."""
+arm, which has a posture for few of the poses that fit its object: where these give no way, as many others for which it
+has one are tried."""
 
 
 LOWER = 0.04
@@ -291,7 +292,7 @@ def _plan(
     points, on_arm = np.array([p.point for p in poses]), world.body.opening is not None
     count, most = (ARM_POSES, ARM_WAYS) if on_arm else (POSES, WAYS)
 
-    def candidates() -> Iterator[tuple[Stance, GraspPose]]:
+    def candidates(others: bool) -> Iterator[tuple[Stance, GraspPose]]:
         aims = [world.com(name), *points[_spread(points, world.com(name))], _nearest(world, floor, points)]
         hardly = points[_apart(points)]
         found = False
@@ -303,8 +304,16 @@ def _plan(
                 best = ordered(poses, stance.yaw, on_arm)
                 if prefers is not None:
                     best.sort(key=_less_wanted(prefers))
-                near = ((_reaching(world, hand, stance, pose, obstacles), pose) for pose in best)
-                yield from itertools.islice(((at, pose) for at, pose in near if at is not None), count)
+                reached = ((_reaching(world, hand, stance, pose, obstacles), pose) for pose in best)
+                near = ((at, pose) for at, pose in reached if at is not None)
+                if others:
+                    near = filter(has_posture, itertools.islice(near, count, None))
+                yield from itertools.islice(near, count)
+
+    def has_posture(candidate: tuple[Stance, GraspPose]) -> bool:
+        stance, pose = candidate
+        follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles, stance)
+        return follows is not None and follows.reaches(pose.at(pose.before))
 
     def has_way(candidate: tuple[Stance, GraspPose], search: bool) -> bool:
         stance, pose = candidate
@@ -314,7 +323,8 @@ def _plan(
         way = hand_path(standing, spheres, rests, goal, back, search=search, follows=follows)
         return goes_on(way, pose.at(0.0), follows, strays=search)
 
-    return first_way(candidates(), has_way, most)
+    found = first_way(candidates(False), has_way, most)
+    return found or (first_way(candidates(True), has_way, most) if on_arm else None)
 
 
 def _beside_first(world: PlannedWorld, name: str, proposed: Iterable[Stance]) -> Iterator[Stance]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 
 import numpy as np
 
@@ -251,14 +251,16 @@ def _plan(
         fraction = min(end, joint.fraction + step) if value else max(end, joint.fraction - step)
         count, sweep = 0, joint.sweep(fraction)[:, :2]
         pinches = pulls and joint.hinge and not floats and _is_held(world, joint)
-        for grip in grips:
-            pinched = _pinched(own, grip, world.body.opening) if pinches else None
-            if flat != (pinches and pinched is None) or (flat and _is_between_rooms(world, joint)):
+        holds = (_holds(world, joint, own, grip, pulls, hand, pinches) for grip in grips)
+        for grip, fingers, pinched in itertools.chain.from_iterable(holds):
+            if flat != (pinches and not pinched) or (flat and _is_between_rooms(world, joint)):
                 continue  # fingers find nothing between them on a flat face, as a leaf has; handles may be there
             count = 0 if floats else count
-            grip, fingers = (grip, _fingers(joint, grip, pulls, hand, floats)) if pinched is None else pinched
             places = joint.path(grip, fraction)
             first, normal = places[0]
+            spheres, before = world.spheres(fingers, -normal), first + ABOVE * normal
+            if not floats and not obstacles.clear(spheres + np.array([*before, 0.0])):
+                continue
             upright = grips is not joint.edges and float(np.linalg.norm(normal[:2])) > UPRIGHT
             middle, face = places[len(places) // 2][0], (first, normal) if upright else None
             proposed = stances(world, hand, middle, floor, AWAY, most=MOST_STANCES, before=face)
@@ -268,8 +270,6 @@ def _plan(
                 stance = reaching_all(world, hand, stance, np.array([p for p, _ in places]), obstacles)
                 if stance is None:
                     continue
-                spheres = world.spheres(fingers, -normal)
-                before = first + ABOVE * normal
                 back = [-ahead(stance.yaw), normal, UP]
                 quat = world.body.turned(hand, fingers, -normal)
                 follows = world.follows(hand, quat, obstacles, stance)
@@ -285,14 +285,29 @@ def _plan(
                 passed += 1
                 if passed > tried:
                     return _JointPlan(stance, places, pulls, fingers, fraction)
-                if pinched is None:
+                if not pinched:
                     break  # the next grip; what fits between fingers is tried from other places
     return None
 
 
-def _pinched(own: Obstacles, grip: FaceGrip, opening: float) -> tuple[FaceGrip, Vector] | None:
-    """A grip with the link in the middle between the fingers of a gripper, and the direction from finger to finger;
-    None: there the link is too wide in any direction, as a flat face is.
+def _holds(
+    world: PlannedWorld, joint: OpenableJoint, own: Obstacles, grip: FaceGrip, pulls: bool, hand: int, pinches: bool
+) -> Iterator[tuple[FaceGrip, Vector, bool]]:
+    """Grips at a place of a face, with where fingers point or, of a gripper, from one to the other, and whether the
+    link is between them: all with the link between the fingers, if that is asked for and there are some, else one.
+
+    Args:
+      own: the object alone.
+    """
+    found = _pinched(own, grip, world.body.opening) if pinches and world.body.opening is not None else []
+    yield from ((at, fingers, True) for at, fingers in found)
+    if not found:
+        yield grip, _fingers(joint, grip, pulls, hand, world.body.opening is None), False
+
+
+def _pinched(own: Obstacles, grip: FaceGrip, opening: float) -> list[tuple[FaceGrip, Vector]]:
+    """Grips with the link between the fingers of a gripper, and the directions from finger to finger, those with it in
+    the middle first; none: there the link is too wide in any direction, as a flat face is.
 
     Args:
       own: the object alone. opening: m between the fingers.
@@ -303,7 +318,7 @@ def _pinched(own: Obstacles, grip: FaceGrip, opening: float) -> tuple[FaceGrip, 
     ways = np.array(across or np.eye(3)[:2])
     count = len(ways)
     which, moved = between_fingers(own, np.tile(point, (count, 1)), ways, np.tile(-normal, (count, 1)), opening)
-    return ((moved[0], normal), ways[which[0]]) if len(which) else None
+    return [((at, normal), ways[k]) for k, at in zip(which, moved, strict=True)]
 
 
 def _is_full(world: PlannedWorld, joint: OpenableJoint) -> bool:
