@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 from pathlib import Path
 
 import pytest
+
+from ig2mj.planning.moves import PrimitiveFailed
 
 CONSTRUCTORS = {"engine/view.py": "over", "engine/base.py": "__copy__", "states/world.py": "with_fields"}
 """The functions that set attributes of an object that they have just made, by file."""
@@ -59,3 +62,31 @@ def test_each_way_to_edit_is_found(source):
 
 def test_reading_is_no_edit():
     assert not _edits("names = list(vars(view))\nview = dataclasses.replace(view, pos=1)\nsetattr(view, 'pos', 1)")
+
+
+def _frozen_exceptions(source: str) -> list[str]:
+    """Frozen dataclasses that are exceptions: a context manager that one passes through sets its `__traceback__`,
+    which raises FrozenInstanceError in its place."""
+    return [
+        node.name
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.ClassDef)
+        and any("frozen=True" in ast.unparse(decorator) for decorator in node.decorator_list)
+        and any(ast.unparse(base).endswith(("Error", "Exception")) for base in node.bases)
+    ]
+
+
+def test_no_exception_is_frozen(repository: Path):
+    folders = ("src", "converters", "homes", "benchmarks", "tests")
+    paths = [path for folder in folders for path in sorted((repository / folder).rglob("*.py"))]
+    assert not {path.name: found for path in paths if (found := _frozen_exceptions(path.read_text()))}
+    assert _frozen_exceptions("@dataclasses.dataclass(frozen=True)\nclass A(Exception): ...") == ["A"]
+
+
+def test_a_failure_passes_through_a_context_manager():
+    @contextlib.contextmanager
+    def block():
+        yield
+
+    with pytest.raises(PrimitiveFailed, match="no_path"), block():
+        raise PrimitiveFailed("no_path", "a wall")

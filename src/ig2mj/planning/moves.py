@@ -54,7 +54,7 @@ RETREAT = 0.12
 UP, DOWN = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(eq=False)
 class PrimitiveFailed(Exception):
     """A primitive cannot go on."""
 
