@@ -16,7 +16,7 @@ from ig2mj.planning.clutter import moved_out_of_the_way, nearest_floor, target_o
 from ig2mj.planning.driving import NEAR, go
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.grasping import held_again, release, set_aside
-from ig2mj.planning.moves import Primitive, Program, free_hand
+from ig2mj.planning.moves import Primitive, Program, free_hand, guarded
 from ig2mj.planning.occupancy import door_objects
 from ig2mj.planning.opening import SHUT, joints_of, move_joint
 from ig2mj.planning.steps import Step
@@ -44,12 +44,12 @@ Action = Callable[[PlannedWorld, Step], Primitive]
 def through_doors(world: PlannedWorld, step: Step, action: Action) -> Primitive:
     """A primitive; where shut doors are in its way they are opened, and it begins again. A base that climbs no
     edges of carpets goes around them, and over them where it fails otherwise."""
-    outcome = yield from _through_doors(world, step, action)
+    outcome = yield from guarded(_through_doors(world, step, action))
     blocked = outcome.reason in ("no_base", "no_path", "timeout")
     if not blocked or world.body.climbs or not world.planner.occupancy.covered.any():
         return outcome
     world.crosses = True
-    return (yield from _through_doors(world, step, action))
+    return (yield from guarded(_through_doors(world, step, action)))
 
 
 def _through_doors(world: PlannedWorld, step: Step, action: Action) -> Primitive:
@@ -189,7 +189,8 @@ def _leaf_swung_aside(world: PlannedWorld, step: Step) -> Generator[Program, str
     if held and (yield from go(world, leaf.off(world))):
         return False
     for name in held:
-        yield from release(world, Step("release", (name,)))
+        if name in world.held:  # else it was lost on the way
+            yield from release(world, Step("release", (name,)))
     tried, left = 0, leaf
     for attempt in range(SWINGS):
         joint = next((j for j in joints_of(world, leaf.door) if j.fraction > SHUT), None)

@@ -62,6 +62,14 @@ class PrimitiveFailed(Exception):
     detail: str
 
 
+def guarded(inner: Primitive) -> Primitive:
+    """A primitive whose `PrimitiveFailed` is its outcome."""
+    try:
+        return (yield from inner)
+    except PrimitiveFailed as e:
+        return Outcome(e.reason, e.detail)
+
+
 def tries_left(most: int, missed: int, opening: float | None) -> int:
     """Tries of a primitive that are left for something that has been tried in vain in this episode by a gripper, whose
     same ways fail again. Other hands have all of them.

@@ -17,7 +17,7 @@ from ig2mj.planning.driving import drive_near, go
 from ig2mj.planning.filling import fill
 from ig2mj.planning.grasping import grasp, is_graspable, off_others_things, release
 from ig2mj.planning.mixing import mix
-from ig2mj.planning.moves import Primitive, PrimitiveFailed
+from ig2mj.planning.moves import Primitive, guarded
 from ig2mj.planning.opening import set_open
 from ig2mj.planning.placing import bring_out, place
 from ig2mj.planning.pouring import pour
@@ -44,16 +44,16 @@ def _tried_again(world: PlannedWorld, step: Step) -> Primitive:
     """A primitive; what can be carried is brought out into the open where it fails, once."""
     action, (name, tool) = ACTIONS[step.primitive], _about(step)
     yield from off_others_things(world)
-    outcome = yield from _guarded(action(world, step))
+    outcome = yield from guarded(action(world, step))
     if outcome.done or step.primitive not in BROUGHT_OUT or outcome.reason in ("slipped", "timeout"):
         return outcome
     if world.domain.fixed(name) or not is_graspable(world, name) or (name not in world.held and all(world.held)):
         return outcome
-    if not (yield from _guarded(bring_out(world, name))).done:
+    if not (yield from guarded(bring_out(world, name))).done:
         return outcome
-    if tool != name and tool not in world.held and not (yield from _guarded(grasp(world, Step("grasp", (tool,))))).done:
+    if tool != name and tool not in world.held and not (yield from guarded(grasp(world, Step("grasp", (tool,))))).done:
         return outcome
-    return (yield from _guarded(action(world, step)))
+    return (yield from guarded(action(world, step)))
 
 
 def _about(step: Step) -> tuple[str, str]:
@@ -61,13 +61,6 @@ def _about(step: Step) -> tuple[str, str]:
     if step.primitive == "pour":
         return step.things[1], step.object
     return step.object, step.things[-1]
-
-
-def _guarded(inner: Primitive) -> Primitive:
-    try:
-        return (yield from inner)
-    except PrimitiveFailed as e:
-        return Outcome(e.reason, e.detail)
 
 
 def navigate_to(world: PlannedWorld, step: Step) -> Primitive:
