@@ -111,9 +111,10 @@ class Cell:
 
 
 def cells(homes: list[str]) -> list[Cell]:
-    """All cells, those of a home one after the other."""
-    found = []
-    for k, home in enumerate(homes):
+    """All cells, those of a home one after the other. A home that ships has the same whatever the other homes are."""
+    found, every = [], [home.name for home in shipped_homes()]
+    for home in homes:
+        k = every.index(home) if home in every else len(every)
         robots = [Cell(home, robot, MODES[(k + 2 * n) % len(MODES)]) for n, robot in enumerate(("humanoid", "fetch"))]
         found += [Cell(home, HAND, "physical"), *robots, Cell(home, REST, "")]
     return found

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import ig2mj
+from benchmarks.harness.homes import shipped_homes
 from benchmarks.soak import energy as soak_energy
 from benchmarks.soak import replay as soak_replay
 from benchmarks.soak import soak
@@ -30,6 +31,13 @@ def test_homes_that_ship_are_soaked_without_the_converter():
     said = "import sys, benchmarks.soak.homes; print([m for m in sys.modules if m.startswith('ig2mj_converters')])"
     done = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_home_has_the_same_robots_and_grasps_whatever_homes_are_run():
+    from benchmarks.soak.homes import cells
+
+    names = [home.name for home in shipped_homes()]
+    assert cells(names[-1:]) == [cell for cell in cells(names) if cell.home == names[-1]]
 
 
 @pytest.fixture(scope="module")

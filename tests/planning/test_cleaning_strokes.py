@@ -10,7 +10,6 @@ from ig2mj.planning.cleaning_strokes import (
     FIRST,
     PRESSED,
     SHIFTED_TURNS,
-    SPREAD,
     HeldTool,
     Region,
     Stroke,
@@ -19,6 +18,7 @@ from ig2mj.planning.cleaning_strokes import (
     spread,
     turn_about,
 )
+from ig2mj.planning.stances import SPREAD
 from ig2mj.planning.tool_areas import is_hidden
 from ig2mj.planning.world import DirtSpot
 

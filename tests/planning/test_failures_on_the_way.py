@@ -1,5 +1,7 @@
 """What a primitive does beforehand, such as to open doors, may fail: that is its outcome, never an error."""
 
+import pytest
+
 from ig2mj.planning import doors
 from ig2mj.planning.moves import PrimitiveFailed
 from ig2mj.planning.steps import Outcome, Step
@@ -19,9 +21,6 @@ def test_a_thing_that_is_lost_while_a_leaf_is_swung_aside_ends_the_primitive(mon
     monkeypatch.setattr(doors, "_leaf_swung_aside", lost)
     world = PlannedWorld.__new__(PlannedWorld)  # nothing of it is asked
     running = doors.through_doors(world, Step("wipe", ("shelf_0", "towel_0")), no_floor)
-    try:
+    with pytest.raises(StopIteration) as ended:
         next(running)
-    except StopIteration as end:
-        assert end.value == Outcome("no_grasp", "no hand holds towel_0")
-    else:
-        raise AssertionError("nothing was to be carried out")
+    assert ended.value.value == Outcome("no_grasp", "no hand holds towel_0")

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from ig2mj.planning import grasping, taps
-from ig2mj.planning.holding import SPREAD, STANCES, farther_ones
+from ig2mj.planning.holding import STANCES, farther_ones
+from ig2mj.planning.stances import SPREAD
 from ig2mj.planning.steps import Outcome
 from ig2mj.planning.world import HANGS, HIGHEST, RAISED, TALL, PlannedWorld, Stance
 

@@ -191,7 +191,6 @@ def test_resets_inside_a_program_put_flagged_worlds_right(batch_of_many, pushing
 
 def test_an_environment_that_is_stepped_from_python_captures_no_graphs(gpu):
     """Arrays that lay elsewhere after each step cost four captures a step, seven times the step itself."""
-    pytest.importorskip("warp")
     from benchmarks.harness.captures import Counts
 
     counts, env = Counts(), ig2mj.make("CookingMeat", worlds=64, engine="warp", pool_size=4)

@@ -206,7 +206,6 @@ class _Episodes:
         self.stopped: list[int] = []  # of these, the ones whose programs still go on
         self.fresh: dict[int, Programs] = {}  # of worlds whose programs begin with the next step
         self.leaving: list[_Leaving] = []  # copies that have not been handed over
-        self.parting: set[int] = set()  # worlds that these are of
         self.steps, self.begun = np.zeros(count, int), np.zeros(count, int)
         self.results: dict[int, EpisodeResult | Ig2mjError] = {}
         self.found: list[PlannedEpisode] = []
@@ -226,7 +225,8 @@ class _Episodes:
             if self._answers():
                 self._step()
             room = max(1, self.env.num_worlds // REFILL)
-            free = [w for w in self.over if not self._waits(w)]
+            waiting = self._waiting()
+            free = [w for w in self.over if w not in waiting]
             if begun < episodes and (len(free) >= room or not self.numbers):
                 new = {world: begun + k for k, world in enumerate(free[: episodes - begun])}
                 self.over = [w for w in self.over if w not in new]
@@ -253,7 +253,6 @@ class _Episodes:
         """Copies worlds for their planners. `ask`: requests of these worlds, made when the copies are handed over."""
         if worlds:
             self.leaving.append(_Leaving(worlds, self.batch.gather(worlds), ask))
-            self.parting.update(worlds)
 
     def _hand_over(self) -> None:
         for each in self.leaving:
@@ -261,11 +260,10 @@ class _Episodes:
             for ask in each.ask:
                 ask()
         self.leaving.clear()
-        self.parting.clear()
 
-    def _waits(self, world: int) -> bool:
-        """Whether a world's planner has been asked, or is about to be."""
-        return world in self.planners.asked or world in self.parting
+    def _waiting(self) -> set[int]:
+        """Worlds whose planners have been asked, or are about to be."""
+        return self.planners.asked.union(*(each.worlds for each in self.leaving))
 
     def _ended(self, world: int, success: bool, why: str) -> None:
         number, result = self.numbers.pop(world), self.results.get(world)
@@ -327,7 +325,7 @@ class _Episodes:
         began = time.perf_counter()
         self.steps += 1
         spent.world_steps += len(self.numbers)
-        spent.waited += sum(self._waits(world) for world in self.numbers)
+        spent.waited += len(self._waiting() & self.numbers.keys())
         stage.act(action)
         stepped = time.perf_counter()
         self._hand_over()

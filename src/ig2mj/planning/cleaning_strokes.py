@@ -18,7 +18,7 @@ from ig2mj.planning.cleaning_area import cleaning_area
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.grasps import OBLIQUE
 from ig2mj.planning.moves import UP, ahead, hand_path
-from ig2mj.planning.stances import stances
+from ig2mj.planning.stances import ALL_AROUND, SPREAD, stances
 from ig2mj.planning.world import DirtSpot, PlannedWorld, Rotation, Stance, Vector
 
 STROKES = 8
@@ -76,11 +76,8 @@ ASKED = 3
 ELSEWHERE = 0.12
 """m between stances from which an object is cleaned."""
 
-ALL_AROUND, SPREAD = 60, 0.25
-"""Stances for each particle that are looked at where the nearest ones do not do, and m between those that are tried."""
-
 LITTLE = 0.6
-"""Share of the radii of hand and tool that needs room there."""
+"""Share of the radii of hand and tool that needs room at stances all around, where the nearest ones do not do."""
 
 ALIKE, LEVEL = 0.9, 0.5
 """Cosine of the angle between normals of the same face; z of the normal of a face that one stands in front of, at

@@ -23,7 +23,7 @@ from ig2mj.planning.moves import (
     turning_point,
 )
 from ig2mj.planning.phases import Phase, Until
-from ig2mj.planning.stances import stances
+from ig2mj.planning.stances import ALL_AROUND, SPREAD, stances
 from ig2mj.planning.world import AWAY, PlannedWorld, Rotation, Stance, Vector
 
 
@@ -171,7 +171,3 @@ _Holding = tuple[Stance, Hold]
 
 STANCES, WAYS, ARM_WAYS = 4, 60, 240
 """Stances for each point, and ways of a hand that are looked for, at most: of one that floats, and of one on an arm."""
-
-ALL_AROUND, SPREAD = 60, 0.25
-"""Stances for each point that are looked at where the hand has no way from the nearest ones, and m between those that
-are tried then."""

@@ -18,6 +18,10 @@ from ig2mj.planning.world import PlannedWorld, Stance, Vector
 APART = 0.12
 """m between stances for the same point, at least."""
 
+ALL_AROUND, SPREAD = 60, 0.25
+"""Stances for a point that go all around what is there, looked at where the nearest ones do not do, and m between those
+that are tried then."""
+
 SIDEWAYS, AVERTED = 0.4, 1.0
 """Cost of standing with a hand's side to a point, and with its shoulder as near to the point as the body brings it. The
 shoulder, the middle of the sphere that bounds a hand's reach (iGibson's behavior_robot.py), is behind the body's axis

@@ -23,7 +23,7 @@ from ig2mj.planning.moves import (
     vector3,
 )
 from ig2mj.planning.phases import Phase, Until
-from ig2mj.planning.stances import stances
+from ig2mj.planning.stances import ALL_AROUND, stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import AWAY, PlannedWorld, Stance, Vector
 
@@ -36,8 +36,8 @@ PRESSING = 0.07
 LOWER = 0.035
 """m below a button that a hand stays which comes to it under what stands out above it, such as a lamp's shade."""
 
-STANCES, ALL_AROUND = 12, 60
-"""That are tried, and that are looked at for those on the button's side of the object."""
+STANCES = 12
+"""That are tried, of `ALL_AROUND` that are looked at for those on the button's side of the object."""
 
 
 def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
