@@ -6,18 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ig2mj.planning.cleaning_strokes import (
-    FIRST,
-    PRESSED,
-    SHIFTED_TURNS,
-    HeldTool,
-    Region,
-    Stroke,
-    one_after_another,
-    regions_of,
-    spread,
-    turn_about,
-)
+from ig2mj.planning.cleaning_strokes import Stroke, one_after_another, spread
+from ig2mj.planning.held_tools import FIRST, PRESSED, SHIFTED_TURNS, HeldTool, Region, regions_of, turn_about
 from ig2mj.planning.stances import SPREAD
 from ig2mj.planning.tool_areas import is_hidden
 from ig2mj.planning.world import DirtSpot

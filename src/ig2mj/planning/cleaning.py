@@ -12,20 +12,11 @@ from collections.abc import Callable, Generator, Sequence
 import numpy as np
 
 from ig2mj.planning.cleaning_area import is_behind, is_covered
-from ig2mj.planning.cleaning_strokes import (
-    CLOSE,
-    FEW,
-    TURNS,
-    HeldTool,
-    Region,
-    Stroke,
-    plan_strokes,
-    regions_of,
-    turn_about,
-)
+from ig2mj.planning.cleaning_strokes import FEW, Stroke, plan_strokes
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp, held_again, put_down_others, with_free_hand
 from ig2mj.planning.handing_over import hand_over_in_the_open
+from ig2mj.planning.held_tools import CLOSE, TURNS, HeldTool, Region, regions_of, turn_about
 from ig2mj.planning.moves import (
     UP,
     Primitive,
