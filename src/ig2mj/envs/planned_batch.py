@@ -335,11 +335,12 @@ class _Episodes:
         terminated, truncated = np.asarray(stage.state.terminated), np.asarray(stage.state.truncated)
         spent.stepping += time.perf_counter() - began - late
         began = time.perf_counter() - late
-        for world in sorted(self.numbers):
-            if terminated[world] or truncated[world]:
+        for world in np.flatnonzero(terminated | truncated).tolist():
+            if world in self.numbers:
                 self._ended(world, bool(terminated[world]), stage.ended(world) or "")
         self._set_programs()
-        ended = [w for w in sorted(self.numbers) if not self.carry.running[w] and w not in self.planners.asked]
+        still = np.flatnonzero(~self.carry.running).tolist()
+        ended = [w for w in still if w in self.numbers and w not in self.planners.asked]
         seconds = (self.steps - self.begun) * self.env.period
         asks = [functools.partial(self.planners.go_on, w, self.carry.reason(w), float(seconds[w])) for w in ended]
         self._leave(ended, asks)

@@ -40,6 +40,8 @@ from ig2mj.planning.solver import EpisodeResult
 TOGETHER = 8
 """Requests that a process gets at once, at most: a step of many worlds takes as long as it plans for some of them."""
 
+NICENESS = 10
+"""By which processes that plan give way to the one that steps the worlds: all worlds wait for that one."""
 
 PackedAnswer = Programs | EpisodeResult | Ig2mjError
 """The next program of a world, the result of its episode, or why there is neither."""
@@ -242,6 +244,7 @@ def _serve(
 ) -> None:
     """The work of a process, until the other end of the pipe is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(NICENESS)
     planning, copies = planning_of(make(name, config), seed), SharedCopies(like, worlds, memory)
     with contextlib.suppress(EOFError, OSError):
         while True:

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from ig2mj.planning.steps import REASONS
 
@@ -91,110 +92,82 @@ REASON_NUMBERS = ("", *REASONS)
 """Reasons by the numbers that programs hold."""
 
 
+_READ: Mapping[str, tuple[Callable[[Phase], Any], Any]] = {
+    "base": (lambda p: p.base, np.int32),
+    "xy": (lambda p: p.xy, (np.float32, 2)),
+    "yaw": (lambda p: p.yaw, np.float32),
+    "hand": (lambda p: p.hand, np.int32),
+    "moves": (lambda p: p.pos is not None, np.int32),
+    "pos": (lambda p: p.pos or (0.0, 0.0, 0.0), (np.float32, 3)),
+    "turns": (lambda p: p.quat is not None, np.int32),
+    "quat": (lambda p: p.quat or (1.0, 0.0, 0.0, 0.0), (np.float32, 4)),
+    "in_body": (lambda p: p.in_body, np.int32),
+    "reset": (lambda p: p.reset, np.int32),
+    "close": (lambda p: -1 if p.close is None else int(p.close), np.int32),
+    "closes": (lambda p: p.closes, np.float32),
+    "until": (lambda p: p.until, np.int32),
+    "object": (lambda p: p.object, np.int32),
+    "keeps": (lambda p: p.keeps, np.int32),
+    "tolerance": (lambda p: p.tolerance, np.float32),
+    "turn_tolerance": (lambda p: p.turn_tolerance, np.float32),
+    "limit": (lambda p: p.limit, np.int32),
+    "after": (lambda p: REASON_NUMBERS.index(p.after), np.int32),
+    "speed": (lambda p: p.speed or (HAND_SPEED if p.hand >= 0 else SPEED), np.float32),
+    "rise": (lambda p: np.nan if p.rise is None else p.rise, np.float32),
+    "both": (lambda p: p.both, np.int32),
+}
+"""What the arrays hold of a phase: how it is read, and its type. `moves` and `turns`: it has a position, and a quat."""
+
+_PHASE = np.dtype([(name, *(kind if isinstance(kind, tuple) else (kind,))) for name, (_, kind) in _READ.items()])
+
+_BEHIND = np.zeros((), _PHASE)
+"""A phase behind the end of a program."""
+_BEHIND["rise"] = np.nan
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Programs:
-    """Programs of a batch; the fields are those of `Phase`, and a world's phases from `length` on do not count. `rise`
-    is NaN for None."""
+    """Programs of a batch.
+
+    Attributes:
+      length: phases of each world's program. phases: [W, P] of records, whose fields are those of `Phase`, with -1 for
+        a hand that stays as it is (`close`), NaN for a body that does (`rise`), and `moves` and `turns`, which say
+        whether there are a position and an orientation. A world's phases from `length` on do not count.
+    """
 
     length: Int[np.ndarray, "W"]
-    base: Int[np.ndarray, "W P"]
-    xy: Float[np.ndarray, "W P 2"]
-    yaw: Float[np.ndarray, "W P"]
-    hand: Int[np.ndarray, "W P"]
-    moves: Int[np.ndarray, "W P"]
-    pos: Float[np.ndarray, "W P 3"]
-    turns: Int[np.ndarray, "W P"]
-    quat: Float[np.ndarray, "W P 4"]
-    in_body: Int[np.ndarray, "W P"]
-    reset: Int[np.ndarray, "W P"]
-    close: Int[np.ndarray, "W P"]
-    closes: Float[np.ndarray, "W P"]
-    until: Int[np.ndarray, "W P"]
-    object: Int[np.ndarray, "W P"]
-    keeps: Int[np.ndarray, "W P"]
-    tolerance: Float[np.ndarray, "W P"]
-    turn_tolerance: Float[np.ndarray, "W P"]
-    limit: Int[np.ndarray, "W P"]
-    after: Int[np.ndarray, "W P"]
-    speed: Float[np.ndarray, "W P"]
-    rise: Float[np.ndarray, "W P"]
-    both: Int[np.ndarray, "W P"]
+    phases: np.ndarray
 
     @classmethod
     def pack(cls, programs: Sequence[Sequence[Phase]]) -> Programs:
         """One program for each world; an empty one does nothing."""
-        most = max([1, *map(len, programs)])
-        padded = [[*p, *[Phase()] * (most - len(p))] for p in programs]
-
-        def column(read, dtype) -> np.ndarray:
-            return np.array([[read(phase) for phase in row] for row in padded], dtype)
-
-        return cls(
-            length=np.array([len(p) for p in programs], np.int32),
-            base=column(lambda p: p.base, np.int32),
-            xy=column(lambda p: p.xy, np.float32),
-            yaw=column(lambda p: p.yaw, np.float32),
-            hand=column(lambda p: p.hand, np.int32),
-            moves=column(lambda p: p.pos is not None, np.int32),
-            pos=column(lambda p: p.pos or (0.0, 0.0, 0.0), np.float32),
-            turns=column(lambda p: p.quat is not None, np.int32),
-            quat=column(lambda p: p.quat or (1.0, 0.0, 0.0, 0.0), np.float32),
-            in_body=column(lambda p: p.in_body, np.int32),
-            reset=column(lambda p: p.reset, np.int32),
-            close=column(lambda p: -1 if p.close is None else int(p.close), np.int32),
-            closes=column(lambda p: p.closes, np.float32),
-            until=column(lambda p: p.until, np.int32),
-            object=column(lambda p: p.object, np.int32),
-            keeps=column(lambda p: p.keeps, np.int32),
-            tolerance=column(lambda p: p.tolerance, np.float32),
-            turn_tolerance=column(lambda p: p.turn_tolerance, np.float32),
-            limit=column(lambda p: p.limit, np.int32),
-            after=column(lambda p: REASON_NUMBERS.index(p.after), np.int32),
-            speed=column(lambda p: p.speed or (HAND_SPEED if p.hand >= 0 else SPEED), np.float32),
-            rise=column(lambda p: np.nan if p.rise is None else p.rise, np.float32),
-            both=column(lambda p: p.both, np.int32),
-        )
+        length = np.array([len(p) for p in programs], np.int32)
+        phases = np.full((len(programs), max([1, *map(len, programs)])), _BEHIND)
+        for row, program in zip(phases, programs, strict=True):
+            for number, phase in enumerate(program):
+                row[number] = tuple(read(phase) for read, _ in _READ.values())
+        return cls(length, phases)
 
     @classmethod
     def together(cls, parts: Sequence[Programs]) -> Programs:
         """Worlds of all parts, at least one, in their order. P is that of the longest program."""
-        most = max(part.base.shape[1] for part in parts)
-        found = {"length": np.concatenate([part.length for part in parts])}
-        for f in dataclasses.fields(cls):
-            if f.name != "length":
-                fill = np.nan if f.name == "rise" else 0.0
-                found[f.name] = np.concatenate([_longer(getattr(part, f.name), most, fill) for part in parts])
-        return cls(**found)
+        length = np.concatenate([part.length for part in parts])
+        phases = np.full((len(length), max(part.phases.shape[1] for part in parts)), _BEHIND)
+        end = 0
+        for part in parts:
+            begin, end = end, end + len(part.phases)
+            phases[begin:end, : part.phases.shape[1]] = part.phases
+        return cls(length, phases)
 
     def with_rows(self, worlds: Int[np.ndarray, "k"], others: Programs) -> Programs:
         """The same with the programs of `others` in k worlds. P is that of the longest program that was ever there."""
-        most, ends = max(self.base.shape[1], others.base.shape[1]), others.base.shape[1]
-        found = {}
-        for f in dataclasses.fields(self):
-            old, new = getattr(self, f.name), getattr(others, f.name)
-            if f.name == "length":
-                found[f.name] = old.copy()
-                found[f.name][worlds] = new
-                continue
-            fill = np.nan if f.name == "rise" else 0.0
-            found[f.name] = _longer(old, most, fill)
-            found[f.name][worlds, :ends] = new
-            found[f.name][worlds, ends:] = fill
-        return Programs(**found)
+        count, ends = len(self.phases), others.phases.shape[1]
+        length, phases = self.length.copy(), np.full((count, max(self.phases.shape[1], ends)), _BEHIND)
+        phases[:, : self.phases.shape[1]] = self.phases
+        length[worlds], phases[worlds, :ends], phases[worlds, ends:] = others.length, others.phases, _BEHIND
+        return Programs(length, phases)
 
     def at(self, phase: Int[np.ndarray, "W"]) -> dict[str, np.ndarray]:
-        """The present phase of every world: each field but `length` without the P axis."""
-        row = np.arange(len(phase))
-        return {
-            f.name: getattr(self, f.name)[row, np.minimum(phase, self.base.shape[1] - 1)]
-            for f in dataclasses.fields(self)
-            if f.name != "length"
-        }
-
-
-def _longer(values: np.ndarray, count: int, fill: float) -> np.ndarray:
-    """A copy of values, [W, P, ...], with so many phases; those behind a program's end are read when it has ended."""
-    longer = np.empty((len(values), count, *values.shape[2:]), values.dtype)
-    longer[:, : values.shape[1]] = values
-    longer[:, values.shape[1] :] = fill
-    return longer
+        """The present phase of every world: each field without the P axis."""
+        rows = self.phases[np.arange(len(phase)), np.minimum(phase, self.phases.shape[1] - 1)]
+        return {name: rows[name] for name in _READ}

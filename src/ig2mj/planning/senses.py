@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 
+import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -60,14 +61,17 @@ class FrictionHolds:
 def sense(view: PhysicsView, agent: int, hands: Int[np.ndarray, "H"], friction: FrictionHolds | None = None) -> Senses:
     """What the view says of one robot. friction: its hands hold by friction alone; None: by constraints."""
     a = view.agent
+    holding = view.held if friction is None else a.finger_force
+    read = a.base_pos, a.base_quat, a.hand_pos, a.hand_quat, holding, a.touching, a.joint_pos
+    base_pos, base_quat, hand_pos, hand_quat, holding, touching, joints = jax.device_get(read)  # copied side by side
     return Senses(
-        base_pos=np.asarray(a.base_pos)[:, agent],
-        base_quat=np.asarray(a.base_quat)[:, agent],
-        hand_pos=np.asarray(a.hand_pos)[:, hands],
-        hand_quat=np.asarray(a.hand_quat)[:, hands],
-        held=np.asarray(view.held)[:, hands] if friction is None else friction(a.finger_force),
-        touching=np.asarray(a.touching)[:, agent],
-        joints=np.asarray(a.joint_pos),
+        base_pos=base_pos[:, agent],
+        base_quat=base_quat[:, agent],
+        hand_pos=hand_pos[:, hands],
+        hand_quat=hand_quat[:, hands],
+        held=holding[:, hands] if friction is None else friction(holding),
+        touching=touching[:, agent],
+        joints=joints,
     )
 
 

@@ -26,6 +26,7 @@ from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx.contacts import Contacts, larger_forces, no_forces, touching_units, without_ignored
 from ig2mj.engine.mjx.copying import MjxCopies
 from ig2mj.engine.mjx.execution import TracedExecution
+from ig2mj.engine.mjx.packed_rows import PackedRows
 from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, fresh, mujoco_of, uncommitted
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import after_release, apply_write, reaches, trees_joined, with_islands
@@ -92,7 +93,7 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
         # One program each, not hundreds of little ones; and what several programs contain is traced once.
         self._first = Compiled(self._start_all)
         self._row = jax.jit(lambda physics, world: jax.tree.map(lambda a: a[world], self.snapshot(physics)))
-        self._rows = jax.jit(lambda tree, worlds: jax.tree.map(lambda a: a[worlds], tree))
+        self._gathered = PackedRows(lambda physics, tree: (self.snapshot(physics), tree))
         self._view, self._placed = jax.jit(self._make_view), jax.jit(self._kinematics)
         self._mapped = jax.jit(self._map, static_argnums=0)
 
@@ -266,18 +267,15 @@ class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
 
     def gather(self, physics: MjxPhysics, tree: Any, worlds: Sequence[int]) -> Callable[[], tuple[Snapshot, Any]]:
         """See `Engine.gather`: up to 1,024 worlds by one call, compiled for each of `GATHERED`."""
-        begun: list[tuple[int, Any]] = []
+        begun: list[tuple[int, Callable[[], Any]]] = []
         for first in range(0, len(worlds), GATHERED[-1]):
             chosen = list(worlds[first : first + GATHERED[-1]])
             size = next(s for s in GATHERED if s >= len(chosen))
             index = np.array([*chosen, *[chosen[0]] * (size - len(chosen))], np.int32)
-            rows = self._row(fresh(physics), index), self._rows(tree, index)
-            for array in jax.tree.leaves(rows):
-                array.copy_to_host_async()
-            begun.append((len(chosen), rows))
+            begun.append((len(chosen), self._gathered.begin(index, fresh(physics), tree)))
 
         def finish() -> tuple[Snapshot, Any]:
-            found = [jax.tree.map(lambda a, count=count: a[:count], jax.device_get(rows)) for count, rows in begun]
+            found = [jax.tree.map(lambda a, count=count: a[:count], wait()) for count, wait in begun]
             return found[0] if len(found) == 1 else jax.tree.map(lambda *parts: np.concatenate(parts), *found)
 
         return finish
