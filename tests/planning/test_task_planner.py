@@ -336,6 +336,13 @@ def test_what_was_taken_for_a_condition_is_first_put_where_that_becomes_true(mod
     assert first([], beside) == floor
 
 
+def test_of_doors_between_rooms_those_that_are_least_open_are_shut_first(model):
+    conditions = read_conditions(["(not (open cabinet))", "(not (open box))", "(not (open fridge))"])
+    share = {"cabinet": 0.9, "box": 0.1, "fridge": 0.5}.__getitem__
+    order = ordered(conditions, {}, [], lambda c: "", Domain(model, 2), ajar=share)
+    assert [c.arguments[0] for c in order] == ["box", "fridge", "cabinet"]
+
+
 def test_what_is_next_to_a_container_comes_after_what_goes_into_it():
     texts = ["(next_to book bag)", "(inside pen bag)", "(on_top bag bed)", "(next_to bag lamp)"]
     order = [str(c) for c in supports_first(read_conditions(texts))]

@@ -113,6 +113,10 @@ class Domain:
         """Whether an object has joints that count for `open`."""
         return name in self._openable
 
+    def is_door(self, name: str) -> bool:
+        """Whether an object is a door between rooms."""
+        return self.model.tables.object_categories[self.index(name)] == "door"
+
     def halves(self, name: str) -> tuple[str, ...]:
         """Names of what an object is cut into."""
         names = self.model.tables.object_names

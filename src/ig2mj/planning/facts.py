@@ -73,6 +73,13 @@ class Facts:
         index = self.domain.index(name)
         return np.asarray(self.view.aabb_low)[0, index], np.asarray(self.view.aabb_high)[0, index]
 
+    def open_share(self, name: str) -> float:
+        """Share of its range, 0 to 1, to which the joint of an object is open that is open farthest; 0 without one."""
+        tables = self.domain.model.tables
+        own = tables.openable_object == self.domain.index(name)
+        closed, opened = tables.openable_closed[own], tables.openable_open[own]
+        return float(((np.asarray(self.view.joint_pos)[0, own] - closed) / (opened - closed)).max(initial=0.0))
+
     def sliced(self, name: str) -> bool:
         """Whether an object has been cut, so that its halves stand for it."""
         return bool(np.asarray(self.states.sliced)[0, self.domain.index(name)]) and bool(self.domain.halves(name))

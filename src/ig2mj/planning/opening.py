@@ -226,7 +226,7 @@ def _ways(
 
 def _is_between_rooms(world: PlannedWorld, joint: OpenableJoint) -> bool:
     """Whether a joint is that of a door between rooms."""
-    return world.domain.model.tables.object_categories[joint.object_index] == "door"
+    return world.domain.is_door(joint.object)
 
 
 def _is_held(world: PlannedWorld, joint: OpenableJoint) -> bool:

@@ -55,7 +55,7 @@ class StepBuilder:
         self._on: dict[str, bool] = {}
         self._wet: set[str] = set()
         self._inside: dict[str, tuple[str, ...]] = {}
-        for condition in ordered(missing, failed, self._held, self._tool, self._domain, begun, stuck):
+        for condition in ordered(missing, failed, self._held, self._tool, self._domain, begun, stuck, self._ajar):
             self._serves = condition
             self._make(condition)
         for condition in required:  # what the steps themselves made false
@@ -136,6 +136,10 @@ class StepBuilder:
             )
 
         return min(tools, key=rank)
+
+    def _ajar(self, name: str) -> float:
+        """Share of its range to which a door between rooms is open; 0 of anything else."""
+        return self._facts.open_share(name) if self._domain.is_door(name) else 0.0
 
     def _failures(self, *steps: tuple[str, ...]) -> int:
         """How often steps have failed, each given by its primitive and arguments."""

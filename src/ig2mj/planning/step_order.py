@@ -32,6 +32,7 @@ def ordered(
     domain: Domain,
     begun: Condition | None = None,
     stuck: Collection[Condition] = (),
+    ajar: Callable[[str], float] = lambda name: 0.0,
 ) -> list[Condition]:
     """Conditions in the order in which they are made true, without those that failed `GIVE_UP` times.
 
@@ -39,7 +40,9 @@ def ordered(
       missing: conditions that are false. failed: how often steps of a condition failed. held: what hands hold.
       tool: what cleans or cuts for a condition. begun: condition that the last step was for; it is gone on with if a
         hand holds one of its objects, or it has failed before, since its steps change what others need. stuck:
-        conditions that failed in the world as it is now; they come after the others.
+        conditions that failed in the world as it is now; they come after the others. ajar: share of its range to which
+        an object is open, 0 to 1. Those that are shut come in this order: of a door that stands wide open the leaf is
+        within reach only in the room that it opens into, in which a robot that shuts it is shut in.
     """
     targets = list(dict.fromkeys(c.arguments[-1] for c in missing))
     first = sorted((c for c in missing if c.predicate in FIRST), key=lambda c: FIRST.index(c.predicate))
@@ -51,7 +54,7 @@ def ordered(
     frozen = [c for c in missing if c.predicate == "frozen"]
     opens = [c for c in missing if c.predicate == "open" and c.value]
     switches = [c for c in missing if c.predicate == "toggled_on"]
-    shut = [c for c in missing if c.predicate == "open" and not c.value]
+    shut = sorted((c for c in missing if c.predicate == "open" and not c.value), key=lambda c: ajar(c.arguments[0]))
     order = [*opens, *first, *away, *down, *attached, *frozen, *switches, *shut]
     in_hand = [c for c in order if c.arguments[0] in held and c.predicate in (*PLACE, *FIRST, "attached")]
     tools = [c for c in order if c.predicate in ("dusty", "stained", "sliced") and tool(c) in held]
