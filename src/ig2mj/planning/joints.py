@@ -77,7 +77,7 @@ class OpenableJoint:
         """Points of the link after the joint has moved."""
         if not self.hinge:
             return points + by * self.axis
-        return (points - self.anchor) @ _about(self.axis, by).T + self.anchor
+        return (points - self.anchor) @ about(self.axis, by).T + self.anchor
 
     def path(self, grip: FaceGrip, fraction: float) -> list[FaceGrip]:
         """Points and normals of the face where a hand is, from where the link is now to a share of its range."""
@@ -196,7 +196,7 @@ def _side_grips(joint: OpenableJoint, middle: Vector) -> tuple[FaceGrip, ...]:
     return tuple(found)
 
 
-def _about(axis: Vector, angle: float) -> Float[np.ndarray, "3 3"]:
+def about(axis: Vector, angle: float) -> Float[np.ndarray, "3 3"]:
     """Rotation matrix."""
     x, y, z = axis / np.linalg.norm(axis)
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

@@ -15,7 +15,6 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
 
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
@@ -23,7 +22,8 @@ from ig2mj.planning.clearance import straight
 from ig2mj.planning.driving import shift
 from ig2mj.planning.grasping import grasp, is_graspable
 from ig2mj.planning.grasps import GraspPose
-from ig2mj.planning.joints import OPEN_TO, OpenableJoint
+from ig2mj.planning.hanging_open import hung_open, sinking_flap
+from ig2mj.planning.joints import OPEN_TO, OpenableJoint, about
 from ig2mj.planning.moves import LET_GO, OPENS, RETREAT, TOUCHES, UP, Primitive, Program, ahead, vector3
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.opening import joints_of, set_open, withdraw
@@ -76,8 +76,11 @@ OFFSETS = sorted(itertools.product((0.0, 0.15, 0.3), (0.0, 0.15, -0.15, 0.3, -0.
 
 
 def opens(world: PlannedWorld, step: Step) -> Primitive:
-    """The primitive that opens: what opens when it is turned over is turned over, all else is opened by `set_open`."""
+    """The primitive that opens: what opens when it is turned over is turned over, a box that a gripper takes is held so
+    that its flap sinks open, all else is opened by `set_open`."""
     name = step.object
+    if world.body.opening is not None and not world.facts.holds("open", name) and sinking_flap(world, name) is not None:
+        yield from hung_open(world, name)
     for _ in range(TURNS if world.body.opening is None else 0):
         if world.facts.holds("open", name) or falling_flap(world, name) is None:
             break
@@ -117,7 +120,7 @@ def falling_flap(world: PlannedWorld, name: str) -> Flap | None:
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, joint.name)
     body, sign = int(model.jnt_bodyid[number]), np.sign(joint.open - joint.closed)
     weight = float(model.body_mass[body]) * float(np.linalg.norm(model.opt.gravity))
-    centre = _about(model.jnt_axis[number], -float(model.qpos0[model.jnt_qposadr[number]]) + joint.closed)
+    centre = about(model.jnt_axis[number], -float(model.qpos0[model.jnt_qposadr[number]]) + joint.closed)
     axis, arm = sign * model.jnt_axis[number], centre @ (model.body_ipos[body] - model.jnt_pos[number])
     arm = arm - (arm @ axis) * axis
     friction = float(model.dof_frictionloss[model.jnt_dofadr[number]])
@@ -248,16 +251,9 @@ def _program(
 def turns(upright: Rotation, axis: Vector, turn: float) -> list[Rotation]:
     """Orientations one after another of a container that is turned from upright about a level axis of its own frame,
     then onto its side, and from there up."""
-    over = [upright @ _about(axis, (turn - 2 * np.pi) * share) for share in np.linspace(0.0, 1.0, PARTS + 1)]
+    over = [upright @ about(axis, (turn - 2 * np.pi) * share) for share in np.linspace(0.0, 1.0, PARTS + 1)]
     down = over[-1].T @ -UP  # in the container's frame
     side = np.cross(down, axis)
     half = np.pi / 2 * np.array([0.5, 1.0])
-    onto = [over[-1] @ _about(side, -angle) for angle in half]
-    return [*over, *onto, *(onto[-1] @ _about(np.cross(axis, -UP), -angle) for angle in half)]
-
-
-def _about(axis: Float[np.ndarray, "3"], angle: float) -> Rotation:
-    """Matrix of a rotation about a unit vector."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
+    onto = [over[-1] @ about(side, -angle) for angle in half]
+    return [*over, *onto, *(onto[-1] @ about(np.cross(axis, -UP), -angle) for angle in half)]

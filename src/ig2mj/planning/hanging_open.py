@@ -1,0 +1,108 @@
+"""Opening loose boxes with a gripper on an arm, which finds nothing to hook below a flap that is flush with its box: it
+takes the box and holds it turned so that the flap sinks open by its own weight, until it is past upright, from where it
+does not fall shut when the box stands again.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Generator, Iterator
+
+import numpy as np
+
+from ig2mj.geometry.host_rotations import about_vertical
+from ig2mj.planning.grasping import grasp, is_graspable, release
+from ig2mj.planning.joints import OPEN_TO, OpenableJoint, about
+from ig2mj.planning.moves import UP, Program, ahead, carry, quaternion, turn_at, vector3
+from ig2mj.planning.opening import joints_of
+from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.steps import Step
+from ig2mj.planning.world import HELD_MARGIN, PlannedWorld, Rotation, Vector
+
+TILTS, DIRECTIONS = (np.pi / 2, 0.75 * np.pi, np.pi), 8
+"""rad by which a box is turned from how it is held, and horizontal axes about which."""
+
+SINKS = 0.2
+"""Share of the torque of a level flap's weight that opens it, at least, on its way."""
+
+OFFSETS = tuple(itertools.product((0.0, 0.15), (0.0, 0.2, -0.2), (0.0, 0.15, -0.15)))
+"""m ahead, to the side and up from where a box is carried at which it is turned."""
+
+LOOK, LOOKS, CREEPS = 20, 20, 0.005
+"""Agent steps between looks at a flap that sinks, and looks; share of its range by which it sinks in between at least.
+"""
+
+
+def sinking_flap(world: PlannedWorld, name: str) -> OpenableJoint | None:
+    """The flap of a box that a hand takes and that nothing is in; None: it has none."""
+    if world.domain.fixed(name) or world.domain.hands_for(name) > 1 or not is_graspable(world, name):
+        return None
+    flaps = [j for j in joints_of(world, name) if j.hinge]
+    return None if not flaps or world.facts.things_in(name) else flaps[0]
+
+
+def hung_open(world: PlannedWorld, name: str) -> Generator[Program, str, None]:
+    """Takes a box, holds it so that its flap sinks open, and puts it down."""
+    if name not in world.held and (all(world.held) or not (yield from grasp(world, Step("grasp", (name,)))).done):
+        return
+    hand, index = world.held.index(name), world.index(name)
+    found, quat = _hanging(world, name, hand), world.hand_quat(hand)
+    if found is not None:
+        point, rotation = found
+        turned = world.turned_hand(hand, rotation)
+        lost = yield turn_at(world, hand, point, turned, keeps=index)
+        held = Phase(hand=hand, pos=vector3(point), quat=turned, keeps=index, until=Until.WAITED, limit=LOOK)
+        before = -1.0
+        for _ in range(LOOKS):
+            flap = sinking_flap(world, name)
+            if lost or flap is None or flap.fraction > OPEN_TO or flap.fraction - before < CREEPS:
+                break
+            before = flap.fraction
+            lost = yield [held]
+        yield [carry(world, hand, keeps=index), *turn_at(world, hand, point, quaternion(quat), keeps=index)]
+    if name in world.held:
+        yield from release(world, Step("release", (name,)))
+
+
+def _hanging(world: PlannedWorld, name: str, hand: int) -> tuple[Vector, Rotation] | None:
+    """Where a hand holds a box, and the rotation by which it is turned there, so that its flap sinks; None: there is no
+    such pose with room that the arm reaches."""
+    flap = sinking_flap(world, name)
+    if flap is None:
+        return None
+    obstacles, grip = world.obstacles([name], world.stance), world.grip(hand)
+    wide = flap.moved(flap.vertices, flap.closed + OPEN_TO * (flap.open - flap.closed) - flap.now) - grip
+    carried, front = world.carried(hand, world.stance), ahead(world.stance.yaw)
+    for rotation in sorted(_rotations(), key=lambda r: -sinks(flap, r)):
+        if sinks(flap, rotation) < SINKS:
+            break
+        spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
+        flaps = np.column_stack([wide @ rotation.T, np.full(len(wide), HELD_MARGIN)])
+        held = np.concatenate([spheres, flaps])
+        follows = world.follows(hand, world.turned_hand(hand, rotation), obstacles)
+        for more, aside, up in OFFSETS:
+            point = carried + more * front + aside * np.cross(UP, front) + up * UP
+            if obstacles.clear(held + np.array([*point, 0.0])) and (follows is None or follows.reaches(point)):
+                return point, rotation
+    return None
+
+
+def _rotations() -> Iterator[Rotation]:
+    yield np.eye(3)
+    for turn in np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS):
+        axis = about_vertical(float(turn))[:, 0]
+        for tilt in TILTS:
+            yield about(axis, tilt)
+
+
+def sinks(flap: OpenableJoint, rotation: Rotation) -> float:
+    """Share of the torque of a level flap's weight that opens it, at least, on its way from where it is to where it is
+    open, if its box is turned by a rotation, world frame."""
+    sign, found = np.sign(flap.open - flap.closed), []
+    axis = rotation @ flap.axis
+    for share in np.linspace(flap.fraction, OPEN_TO, 3):
+        corners = flap.moved(flap.vertices, flap.closed + share * (flap.open - flap.closed) - flap.now)
+        arm = rotation @ (corners.mean(0) - flap.anchor)
+        arm = arm - (arm @ axis) * axis
+        found.append(float(sign * axis @ np.cross(arm / np.linalg.norm(arm), -UP)))
+    return min(found)
