@@ -8,26 +8,28 @@ All worlds take an agent step together, in one call. Programs of all worlds are 
 (`ig2mj.planning.execution`). A world whose program has ended is copied to the process that plans for it, holds still
 until the answer is there, and delays no other world. Copies of several worlds leave the device together
 (`Engine.gather`), in batches of `GATHERED`, so that nothing is compiled again. They are handed over, and answers are
-read, while the device takes the next step.
+read, while the worlds take the next step.
 
 Axes: W worlds.
 """
 
 from __future__ import annotations
 
+import concurrent.futures
 import dataclasses
 import functools
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Future
 from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from ig2mj.engine.base import GATHERED
 from ig2mj.engine.snapshot import Snapshot
-from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.planning_processes import PlanningProcesses
 from ig2mj.envs.planning_stage import EnvironmentStage
@@ -37,9 +39,13 @@ from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.phases import Programs
 from ig2mj.planning.physics import check_robot
 from ig2mj.planning.solver import EpisodeResult
+from ig2mj.process.worker_threads import WorkerThreads
 
-LISTENING = 0.002
-"""s that answers are waited for at a time while the device steps the worlds."""
+LISTENING = 0.001
+"""s that answers are waited for at a time while the worlds are stepped."""
+
+SETTING_OUT = 0.004
+"""s for which a step has the interpreter for itself, so that the device begins it at once."""
 
 REFILL = 16
 """Share of the worlds, one in so many, whose episodes are over before they begin others: one call resets them all."""
@@ -67,8 +73,8 @@ class Spent:
 
     Attributes:
       stepping: s in the environment's step, until its results are there. following: s in which programs are followed,
-        and answers read while the environment does not step. copying: s in which worlds are copied while the
-        environment does not step; where the step has ended when copies have been handed over, all the time of that.
+        and answers read while the environment does not step. copying: s in which worlds are copied, handed over, and
+        answers read after the environment's step has ended.
         blocked: s in which no world had a program.
       world_steps: agent steps of all worlds. waited: of these, those in which a world held still for its planner.
       planned: processor s of all processes. programs: that were planned.
@@ -116,6 +122,7 @@ class PlannedBatch:
         self.stage = EnvironmentStage(env)
         self.body = body_of(env.scene, self.stage.controller, 0)
         self.planners = PlanningProcesses(env, processes, seed)
+        self._stepper = WorkerThreads(1, "steps")
 
     def run(
         self,
@@ -182,8 +189,19 @@ class PlannedBatch:
         physics, states = copies()
         self.planners.keep(worlds, physics, jax.tree.leaves(states))
 
+    def begin_step(self, action: Float[np.ndarray, "W n"]) -> Future[float]:
+        """Begins an agent step of all worlds, in a thread: the call of a program returns when the device has decided
+        its last branch. The result is when the worlds were there, s of `time.perf_counter`."""
+        return self._stepper.submit(self._stepped, action)
+
+    def _stepped(self, action: Float[np.ndarray, "W n"]) -> float:
+        self.stage.act(action)
+        jax.block_until_ready(self.stage.state.terminated)
+        return time.perf_counter()
+
     def close(self) -> None:
-        """Ends the processes that plan; may be called twice."""
+        """Ends the processes that plan, and the thread that steps; may be called twice."""
+        self._stepper.__exit__(None)
         self.planners.close()
 
     def __enter__(self) -> PlannedBatch:
@@ -326,25 +344,23 @@ class _Episodes:
         self.steps += 1
         spent.world_steps += len(self.numbers)
         spent.waited += len(self._waiting() & self.numbers.keys())
-        stage.act(action)
-        stepped = time.perf_counter()
+        step = self.batch.begin_step(action)
+        concurrent.futures.wait([step], SETTING_OUT)
         self._hand_over()
-        late = time.perf_counter() - stepped if _is_there(stage.state.terminated) else 0.0
-        while self.planners.asked and not self.planners.here and not _is_there(stage.state.terminated):
+        while self.planners.asked and not self.planners.here and not step.done():
             self._take(LISTENING)
+        stepped = step.result()
+        spent.stepping += stepped - began
         terminated, truncated = np.asarray(stage.state.terminated), np.asarray(stage.state.truncated)
-        spent.stepping += time.perf_counter() - began - late
-        began = time.perf_counter() - late
         for world in np.flatnonzero(terminated | truncated).tolist():
             if world in self.numbers:
                 self._ended(world, bool(terminated[world]), stage.ended(world) or "")
-        self._set_programs()
-        still = np.flatnonzero(~self.carry.running).tolist()
-        ended = [w for w in still if w in self.numbers and w not in self.planners.asked]
+        busy = self.planners.asked | self.fresh.keys()
+        ended = [w for w in np.flatnonzero(~self.carry.running).tolist() if w in self.numbers and w not in busy]
         seconds = (self.steps - self.begun) * self.env.period
         asks = [functools.partial(self.planners.go_on, w, self.carry.reason(w), float(seconds[w])) for w in ended]
         self._leave(ended, asks)
-        spent.copying += time.perf_counter() - began
+        spent.copying += time.perf_counter() - stepped
 
 
 @dataclasses.dataclass(frozen=True)
@@ -354,11 +370,6 @@ class _Leaving:
     worlds: Sequence[int]
     copies: Callable[[], tuple[Snapshot, Any]]
     ask: Sequence[Callable[[], None]]
-
-
-def _is_there(array: Array) -> bool:
-    """Whether an array has been computed."""
-    return not isinstance(array, jax.Array) or array.is_ready()  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def line_of(episode: PlannedEpisode) -> str:
