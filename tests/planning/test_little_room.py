@@ -264,7 +264,7 @@ def test_what_is_lost_while_its_container_is_opened_is_taken_again(monkeypatch, 
     def find(world, predicate, step, hand, opened, until):
         yield []
         if stays and taken:
-            return (None, types.SimpleNamespace(drop=0.0)), ()
+            return (None, placing.Spot(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))), ()
         hands[0] = ""
         return placing._NO_WAY, ()
 
@@ -279,8 +279,9 @@ def test_what_is_lost_while_its_container_is_opened_is_taken_again(monkeypatch, 
         return ""
 
     world = object.__new__(World)
-    world.domain = types.SimpleNamespace(hands_for=lambda name: 1)  # pyright: ignore
+    world.domain = types.SimpleNamespace(hands_for=lambda name: 1, loose=())  # pyright: ignore
     changes = {
+        "is_thrown_over": lambda *_: False, "steadied": lambda world, name, hand, action: action,
         "_find": find, "grasp": grasp, "go": nothing, "set_upright": nothing, "from_home": lambda *_: nothing(),
         "letting_go": lambda *_, falls: [], "put_there": lambda *_: (True, ""),
     }  # fmt: skip

@@ -67,7 +67,8 @@ APART = 0.03
 """m between points of a side."""
 
 HIGH = 0.75
-"""Share of an object's height at which its sides are taken, too: a hand has room there above the floor."""
+"""Share of an object's height, without lids and flaps, at which its sides are taken, too: a hand has room there above
+the floor."""
 
 OUTER = 0.8
 """Share of the way from an object's centre of mass to its rim at which it is taken, too."""
@@ -181,14 +182,14 @@ def grasp_poses(world: PlannedWorld, name: str, obstacles: Obstacles, room: floa
     centre, corners = world.com(name), world.vertices(name)
     middles = [world.vertices_of_pieces(np.array([p])).mean(0) for p in np.flatnonzero(tables.piece_object == index)]
     middles.sort(key=lambda m: float(np.linalg.norm(m - centre)))
-    above = np.array([*centre[:2], corners[:, 2].min() + HIGH * np.ptp(corners[:, 2])])
+    trunk = world.vertices_of_pieces(main_pieces(tables, index))
+    above = np.array([*centre[:2], trunk[:, 2].min() + HIGH * np.ptp(trunk[:, 2])])
     aims = np.array([centre, above, *middles[:MIDDLES], *(centre + OUTER * (world.rim(name) - centre))])
     size = float(np.linalg.norm(np.ptp(corners, axis=0))) + 0.1
     all_sides = _SIDES if world.body.opening is None else _ARM_SIDES
     normals = np.array([normal for normal, _ in all_sides])
     origins = aims[None] + size * normals[:, None]
     main = np.flatnonzero((tables.graspable_object == index) & (tables.graspable_joint < 0))
-    trunk = world.vertices_of_pieces(main_pieces(tables, index))
     rays = origins.reshape(-1, 3), np.repeat(-normals, len(aims), axis=0)
     hits = obstacles.entries(*rays, index)
     if len(main):  # not of lids and flaps, which hands do not take hold of

@@ -38,6 +38,7 @@ from ig2mj.planning.moves import (
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.pinches import between_fingers
 from ig2mj.planning.stances import reaching_all, stances
+from ig2mj.planning.steadying import steadied
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import PlannedWorld, Stance, Vector
 
@@ -158,16 +159,24 @@ def move_joint(
         return "no_base", f"no free floor from which a hand can move {joint.name}"
     if reason := (yield from go(world, found.stance)):
         return reason, f"no path leads to where a hand can move {joint.name}"
-    program = yield from from_home(world, hand, functools.partial(_program, world, joint, hand, found))
-    if program is None:
+    reason = yield from steadied(world, joint.object, hand, _moved(world, joint, hand, found))
+    if reason == "no_path":
         return "no_path", f"the hand has no path to {joint.name}"
-    reason = yield program
-    yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=6, after="")]
-    yield withdraw(world, hand)
     now = next(j.fraction for j in joints_of(world, joint.object) if j.name == joint.name)
     if now > found.to - MOVED if value else now < found.to + MOVED:
         return "", ""
     return reason or "not_true_after", f"{joint.name} did not move far enough"
+
+
+def _moved(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointPlan) -> Generator[Program, str, str]:
+    """Moves a joint from where the robot stands, and goes off it; returns why the motion failed."""
+    program = yield from from_home(world, hand, functools.partial(_program, world, joint, hand, plan))
+    if program is None:
+        return "no_path"
+    reason = yield program
+    yield [Phase(hand=hand, close=False, until=Until.EMPTY, limit=6, after="")]
+    yield withdraw(world, hand)
+    return reason
 
 
 def withdraw(world: PlannedWorld, hand: int) -> Program:

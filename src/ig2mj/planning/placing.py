@@ -15,7 +15,7 @@ from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.clearance import HELD, Obstacles, straight
 from ig2mj.planning.driving import go, nearer
-from ig2mj.planning.grasping import grasp, is_graspable, release, with_free_hand
+from ig2mj.planning.grasping import grasp, is_graspable, put_down_others, release, with_free_hand
 from ig2mj.planning.moves import (
     ATTEMPTS,
     LET_GO,
@@ -44,6 +44,7 @@ from ig2mj.planning.opening_around import Tried, is_shut, open_into
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.spots import Spot, ends_down, grip_for, is_tipped, put_there, spots_for, spots_upon
 from ig2mj.planning.stances import stances
+from ig2mj.planning.steadying import is_thrown_over, past_hand, steadied
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.two_hands import place_with_both
 from ig2mj.planning.world import PlannedWorld, Rotation, Stance, Vector
@@ -99,6 +100,10 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 again = yield from grasp(world, Step("grasp", (name,)))
                 if not again.done:
                     break
+            if predicate == "inside" and is_thrown_over(world, where):
+                yield from put_down_others(world, name)
+                if (yield from set_upright(world, where)) and name not in world.held:
+                    continue
             hand = hand_with(world, name)
             found, also = yield from _find(world, predicate, step, hand, opened, until)
             if isinstance(found, str):
@@ -127,16 +132,12 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             if name not in world.held:
                 reason, detail = "slipped", f"the hand lost {name}"
                 continue
-            find = functools.partial(way_to_spot, world, name, hand, spot)
-            planned = yield from from_home(world, hand, find)
-            if planned is None and name in world.held:
-                target, quat, _ = grip_for(world, hand, name, spot)
-                if (yield from nearer(world, hand, quat, target + (LET_GO + spot.drop) * UP)) and name in world.held:
-                    planned = find()
-            if planned is None:
-                reason, detail = "no_path", f"the hand has no way with {name} to its place"
+            before = world.pose(where)[0] if where in world.domain.loose else None
+            bring = _bring(world, name, hand, spot, where, before)
+            reason = yield from (steadied(world, where, hand, bring) if predicate == "inside" else bring)
+            if reason == "no_path":
+                detail = f"the hand has no way with {name} to its place"
                 continue
-            reason = yield from letting_go(world, name, hand, planned, falls=spot.drop > 0.0)
             placed, detail = put_there(world.facts, step, until or predicate)
             if not placed:
                 reason = reason or "not_true_after"
@@ -149,6 +150,30 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
         return Outcome(reason or "not_true_after", detail, attempts=max(tries, 1))
 
     return place
+
+
+def _bring(
+    world: PlannedWorld, name: str, hand: int, spot: Spot, where: str, before: Vector | None
+) -> Generator[Program, str, str]:
+    """A hand brings what it holds to a spot from where the robot stands, as `letting_go`; "no_path": it has no way.
+    Where another hand holds the container, the base goes no nearer.
+
+    Args:
+      before: where a container was for which the spot is, m; the spot moves with what another hand has taken hold of.
+    """
+    if name not in world.held:
+        return "slipped"
+    if before is not None and where in world.held:
+        spot = dataclasses.replace(spot, pos=spot.pos + world.pose(where)[0] - before)
+    find = functools.partial(way_to_spot, world, name, hand, spot)
+    planned = yield from from_home(world, hand, find)
+    if planned is None and name in world.held and where not in world.held:
+        target, quat, _ = grip_for(world, hand, name, spot)
+        if (yield from nearer(world, hand, quat, target + (LET_GO + spot.drop) * UP)) and name in world.held:
+            planned = find()
+    if planned is None:
+        return "no_path"
+    return (yield from letting_go(world, name, hand, planned, falls=spot.drop > 0.0))
 
 
 def letting_go(
@@ -203,6 +228,8 @@ def way_to_spot(world: PlannedWorld, name: str, hand: int, spot: Spot) -> Lettin
     target = target + (LET_GO + spot.drop) * UP
     spheres = _spheres(world, name, hand, spot)
     obstacles = world.obstacles([name], world.stance)
+    if (other := 1 - hand) < len(world.held) and is_thrown_over(world, world.held[other]):  # which holds the container
+        obstacles = past_hand(world, obstacles, other)
     start = turning_point(obstacles, spheres, world.grip(hand), yaw)
     follows = world.follows(hand, quat, obstacles)
     way = hand_path(obstacles, spheres, start, target, [UP, -ahead(yaw)], SPARE, True, follows, turns=True)

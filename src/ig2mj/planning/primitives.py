@@ -18,7 +18,6 @@ from ig2mj.planning.filling import fill
 from ig2mj.planning.grasping import grasp, is_graspable, off_others_things, release
 from ig2mj.planning.mixing import mix
 from ig2mj.planning.moves import Primitive, guarded
-from ig2mj.planning.opening import set_open
 from ig2mj.planning.placing import bring_out, place
 from ig2mj.planning.pouring import pour
 from ig2mj.planning.pushing import push
@@ -27,7 +26,7 @@ from ig2mj.planning.stances import stances
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.switching import toggle
 from ig2mj.planning.treatments import cook, freeze, slice_, soak
-from ig2mj.planning.turning_open import opens
+from ig2mj.planning.turning_open import closes, opens
 from ig2mj.planning.world import AWAY, PlannedWorld
 
 
@@ -86,7 +85,7 @@ ACTIONS: dict[str, Callable[[PlannedWorld, Step], Primitive]] = {
     "place_under": place("under"),
     "place_on_floor": place("on_floor"),
     "open": opens,
-    "close": set_open(False),
+    "close": closes,
     "toggle_on": toggle(True),
     "toggle_off": toggle(False),
     "wipe": clean("dusty"),

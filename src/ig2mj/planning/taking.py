@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.grasps import GraspPose
 from ig2mj.planning.moves import (
     CLOSING,
@@ -42,18 +43,26 @@ would close through thin sides, and catch on them, or throw the thing, when they
 
 
 def closing_on(
-    world: PlannedWorld, name: str, hand: int, pose: GraspPose, way: Sequence[Vector], attempt: int = 0
+    world: PlannedWorld,
+    name: str,
+    hand: int,
+    pose: GraspPose,
+    way: Sequence[Vector],
+    attempt: int = 0,
+    slowly: bool = False,
 ) -> Program:
     """The hand goes along a way to before a grasp, on until it touches the object, and closes until it holds it.
 
     Args:
       attempt: number of the try. A floating hand closes at once on what is thin, and gently on other things; in odd
-        tries the other way.
+        tries the other way. slowly: a floating hand comes as slowly as to what is thin, and closes where it touches:
+        else it pushes over what stands.
     """
     index, quat = world.index(name), world.body.turned(hand, pose.fingers, pose.palm)
     deep, floats = vector3(pose.at(-pose.deep)), world.body.opening is None
     thin = floats and float(np.ptp(world.vertices(name) @ pose.palm)) < THIN
     gently = floats and thin == bool(attempt % 2)
+    slow = thin or slowly
     near = Phase(
         hand=hand,
         pos=vector3(pose.at(min(NEAR, pose.before))),
@@ -73,18 +82,24 @@ def closing_on(
         ]  # fmt: skip
     return [
         *travel(hand, way, quat),
-        *([near] if thin else []),
+        *([near] if slow else []),
         *([] if floats else [before]),
         Phase(hand=hand, pos=deep, quat=quat, until=Until.TOUCHED, object=index, close=False, limit=25, after="",
-              speed=TOUCHING if thin else COMING),
-        Phase(hand=hand, pos=deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15, after="no_grasp",
-              closes=GENTLY if gently else 1.0, speed=CLOSING if floats else GRIPPING),
+              speed=TOUCHING if slow else COMING),
+        Phase(hand=hand, pos=None if slowly else deep, quat=quat, until=Until.HELD, object=index, close=True, limit=15,
+              after="no_grasp", closes=GENTLY if gently else 1.0, speed=CLOSING if floats else GRIPPING),
     ]  # fmt: skip
 
 
-def way_to(world: PlannedWorld, name: str, hand: int, pose: GraspPose) -> list[Vector] | None:
-    """The hand's way to before a grasp, from where the robot stands; None: there is none."""
-    obstacles, spheres = world.obstacles([name]), spheres_of(world, pose)
+def way_to(
+    world: PlannedWorld, name: str, hand: int, pose: GraspPose, obstacles: Obstacles | None = None
+) -> list[Vector] | None:
+    """The hand's way to before a grasp, from where the robot stands; None: there is none.
+
+    Args:
+      obstacles: None: everything but the object.
+    """
+    obstacles, spheres = obstacles or world.obstacles([name]), spheres_of(world, pose)
     follows = world.follows(hand, world.body.turned(hand, pose.fingers, pose.palm), obstacles)
     back = entries(pose, world.base[0])
     way = hand_path(obstacles, spheres, world.grip(hand), pose.at(pose.before), back, search=True, follows=follows)

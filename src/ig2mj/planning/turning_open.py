@@ -20,7 +20,7 @@ from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.clearance import straight
 from ig2mj.planning.driving import shift
-from ig2mj.planning.grasping import grasp, is_graspable
+from ig2mj.planning.grasping import grasp, is_graspable, release
 from ig2mj.planning.grasps import GraspPose
 from ig2mj.planning.hanging_open import hung_open, sinking_flap
 from ig2mj.planning.joints import OPEN_TO, OpenableJoint, about
@@ -29,6 +29,7 @@ from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.opening import joints_of, set_open, withdraw
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.placing import place
+from ig2mj.planning.steadying import is_thrown_over
 from ig2mj.planning.steps import Step
 from ig2mj.planning.world import BODY_SPARE, PlannedWorld, Rotation, Stance, Vector
 
@@ -81,11 +82,24 @@ def opens(world: PlannedWorld, step: Step) -> Primitive:
     name = step.object
     if world.body.opening is not None and not world.facts.holds("open", name) and sinking_flap(world, name) is not None:
         yield from hung_open(world, name)
+    yield from _with_empty_hands(world, name)
     for _ in range(TURNS if world.body.opening is None else 0):
         if world.facts.holds("open", name) or falling_flap(world, name) is None:
             break
         yield from turned_open(world, name)
     return (yield from set_open(True)(world, step))
+
+
+def closes(world: PlannedWorld, step: Step) -> Primitive:
+    """The primitive that closes."""
+    yield from _with_empty_hands(world, step.object)
+    return (yield from set_open(False)(world, step))
+
+
+def _with_empty_hands(world: PlannedWorld, name: str) -> Generator[Program, str, None]:
+    """Puts down what hands hold where both are needed: one holds the container, and the other moves its lid."""
+    for other in dict.fromkeys(n for n in world.held if n and n != name) if is_thrown_over(world, name) else ():
+        yield from release(world, Step("release", (other,)))
 
 
 def _stood(world: PlannedWorld, name: str) -> tuple[Vector, Rotation] | None:
