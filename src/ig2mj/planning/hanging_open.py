@@ -5,15 +5,17 @@ does not fall shut when the box stands again.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 
 import numpy as np
 
-from ig2mj.geometry.host_rotations import about_vertical
+from ig2mj.geometry.host_rotations import about_vertical, turn_onto
+from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.grasping import grasp, is_graspable, release
 from ig2mj.planning.joints import OPEN_TO, OpenableJoint, about
-from ig2mj.planning.moves import UP, Program, ahead, carry, quaternion, turn_at, vector3
+from ig2mj.planning.moves import UP, Program, ahead, vector3
 from ig2mj.planning.opening import joints_of
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.steps import Step
@@ -28,7 +30,10 @@ SINKS = 0.2
 OFFSETS = tuple(itertools.product((0.0, 0.15), (0.0, 0.2, -0.2), (0.0, 0.15, -0.15)))
 """m ahead, to the side and up from where a box is carried at which it is turned."""
 
-LOOK, LOOKS, CREEPS = 20, 20, 0.005
+TURNING, TURNED = 100, 0.15
+"""Agent steps of a turn, at most, and rad within which it is done."""
+
+LOOK, LOOKS, CREEPS = 20, 25, 0.002
 """Agent steps between looks at a flap that sinks, and looks; share of its range by which it sinks in between at least.
 """
 
@@ -46,12 +51,10 @@ def hung_open(world: PlannedWorld, name: str) -> Generator[Program, str, None]:
     if name not in world.held and (all(world.held) or not (yield from grasp(world, Step("grasp", (name,)))).done):
         return
     hand, index = world.held.index(name), world.index(name)
-    found, quat = _hanging(world, name, hand), world.hand_quat(hand)
-    if found is not None:
-        point, rotation = found
-        turned = world.turned_hand(hand, rotation)
-        lost = yield turn_at(world, hand, point, turned, keeps=index)
-        held = Phase(hand=hand, pos=vector3(point), quat=turned, keeps=index, until=Until.WAITED, limit=LOOK)
+    if (found := _hanging(world, name, hand)) is not None:
+        turns = _turned(world, hand, index, *found)
+        held = dataclasses.replace(turns, until=Until.WAITED, limit=LOOK)
+        lost = yield [turns]
         before = -1.0
         for _ in range(LOOKS):
             flap = sinking_flap(world, name)
@@ -59,9 +62,16 @@ def hung_open(world: PlannedWorld, name: str) -> Generator[Program, str, None]:
                 break
             before = flap.fraction
             lost = yield [held]
-        yield [carry(world, hand, keeps=index), *turn_at(world, hand, point, quaternion(quat), keeps=index)]
+    if name in world.held and (stands := _standing(world, name, hand)) is not None:
+        yield [_turned(world, hand, index, *stands)]
     if name in world.held:
         yield from release(world, Step("release", (name,)))
+
+
+def _turned(world: PlannedWorld, hand: int, keeps: int, point: Vector, rotation: Rotation) -> Phase:
+    """The hand goes to a point, and is turned by a rotation from how it is now."""
+    return Phase(hand=hand, pos=vector3(point), quat=world.turned_hand(hand, rotation), keeps=keeps, tolerance=0.05,
+                 turn_tolerance=TURNED, limit=TURNING, after="")  # fmt: skip
 
 
 def _hanging(world: PlannedWorld, name: str, hand: int) -> tuple[Vector, Rotation] | None:
@@ -70,12 +80,29 @@ def _hanging(world: PlannedWorld, name: str, hand: int) -> tuple[Vector, Rotatio
     flap = sinking_flap(world, name)
     if flap is None:
         return None
+    rotations = [r for r in _rotations() if sinks(flap, r) >= SINKS]
+    return _held_so(world, name, hand, flap, sorted(rotations, key=lambda r: -sinks(flap, r)))
+
+
+def _standing(world: PlannedWorld, name: str, hand: int) -> tuple[Vector, Rotation] | None:
+    """The same so that the box is upright."""
+    frame = matrices_on_host(world.pose(name)[1][None])[0]
+    turns = np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS)
+    rotations = [about_vertical(float(turn)) @ turn_onto(frame[:, 2], UP) for turn in turns]
+    return _held_so(world, name, hand, sinking_flap(world, name), rotations)
+
+
+def _held_so(
+    world: PlannedWorld, name: str, hand: int, flap: OpenableJoint | None, rotations: Sequence[Rotation]
+) -> tuple[Vector, Rotation] | None:
+    """Where a hand holds a box turned by the first of some rotations for which it has room, with its flap open as well,
+    and that the arm reaches."""
     obstacles, grip = world.obstacles([name], world.stance), world.grip(hand)
-    wide = flap.moved(flap.vertices, flap.closed + OPEN_TO * (flap.open - flap.closed) - flap.now) - grip
+    wide = np.zeros((0, 3))
+    if flap is not None:
+        wide = flap.moved(flap.vertices, flap.closed + OPEN_TO * (flap.open - flap.closed) - flap.now) - grip
     carried, front = world.carried(hand, world.stance), ahead(world.stance.yaw)
-    for rotation in sorted(_rotations(), key=lambda r: -sinks(flap, r)):
-        if sinks(flap, rotation) < SINKS:
-            break
+    for rotation in rotations:
         spheres = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
         flaps = np.column_stack([wide @ rotation.T, np.full(len(wide), HELD_MARGIN)])
         held = np.concatenate([spheres, flaps])
