@@ -196,7 +196,7 @@ class PlannedBatch:
 
     def _stepped(self, action: Float[np.ndarray, "W n"]) -> float:
         self.stage.act(action)
-        jax.block_until_ready(self.stage.state.terminated)
+        jax.device_get((self.stage.state.terminated, self.stage.state.truncated))  # arrays keep what was copied
         return time.perf_counter()
 
     def close(self) -> None:
@@ -295,14 +295,16 @@ class _Episodes:
         self.watch(episode)
 
     def _answers(self) -> bool:
-        """Takes the planners' answers; whether a step can be taken: some world has a program."""
+        """Begins programs that have come, and takes answers where no step would; whether a step can be taken: some
+        world has a program."""
         began = time.perf_counter()
         if self.planners.here or not self.carry.running.any():
             self._hand_over()
         self.spent.copying += time.perf_counter() - began
         began = time.perf_counter()
         idle = all(world in self.planners.asked for world in self.numbers)
-        self._take(None if idle else 0.0)
+        if idle or self.planners.here:
+            self._take(None if idle else 0.0)
         self._set_programs()
         took = time.perf_counter() - began
         self.spent.blocked, self.spent.following = (
