@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from ig2mj.planning.domain import Domain
+from ig2mj.planning.joints import OPEN_TO
 from ig2mj.planning.kinematic import kinematic_episodes
 from ig2mj.planning.problem import problem_of
 from ig2mj.planning.rung import Rung
@@ -68,3 +69,12 @@ def test_an_episode_is_solved_by_planned_motion():
         (result,) = solve(planner, rung)
         assert result.success
         assert [r.step.primitive for r in result.steps] == ["open", "grasp", "place_inside"]
+
+
+@pytest.mark.slow
+def test_what_is_opened_stands_as_wide_open_as_a_hand_opens_it(tiny_home_folder):
+    problem = problem_of(str(tiny_home_folder), "(open cabinet)")
+    for number in range(3):
+        ((_, rung),) = kinematic_episodes(Domain(problem.model, 2), problem, None, [number])
+        assert do(rung, "open", "cabinet").done
+        assert rung.facts(0).open_share("cabinet") > OPEN_TO - 0.05

@@ -27,6 +27,7 @@ from ig2mj.planning.facts import Facts
 from ig2mj.planning.kinematic_stage import KinematicStage, Pose
 from ig2mj.planning.motion_planner import MotionPlanner
 from ig2mj.planning.moves import Program
+from ig2mj.planning.opened_wide import opened_wide
 from ig2mj.planning.phases import Base, Phase, Until
 from ig2mj.planning.primitives import primitive
 from ig2mj.planning.problem import Problem, start_of
@@ -211,6 +212,8 @@ class KinematicRung:
             wrong = [a for a in step.adds if self.facts(world).holds(a.predicate, *a.arguments) != a.value]
             if wrong and self._symbolic.make_true(world, step) is not None:
                 reason = "not_true_after"
+            elif wrong and step.primitive == "open":
+                self._open_wide(world, step.object)
         self._show(world)
         return reason
 
@@ -275,13 +278,23 @@ class KinematicRung:
         name = tables.object_names[index]
         if self.domain.fixed(name):
             opened = Condition("open", (name,), step.primitive != "close" or step.object != name)
-            return "" if self._symbolic.make_true(world, step, [opened]) is None else "not_true_after"
+            if self._symbolic.make_true(world, step, [opened]) is not None:
+                return "not_true_after"
+            if opened.value:
+                self._open_wide(world, name)
+            return ""
         query = self._symbolic.show(world)
         pos, quat = (np.asarray(a)[0, index].astype(float) for a in (query.view.object_pos, query.view.object_quat))
         robot.held[hand], robot.grasps[hand] = name, _in(robot.hands[hand], (pos, quat))
         if robot.held.count(name) == 1:
             self._symbolic.hold(world, name)
         return ""
+
+    def _open_wide(self, world: int, name: str) -> None:
+        """Opens what has been opened as wide as a hand does, if it stays so."""
+        query = self._symbolic.show(world)
+        if (physics := opened_wide(query, self._bare.model.tables, self._bare.index(name))) is not None:
+            self._symbolic.put(world, physics)
 
     def _let_go(self, world: int, hand: int) -> None:
         """Lets go of what a hand holds; it comes to rest."""

@@ -128,6 +128,10 @@ class SymbolicRung:
     def let_go(self, world: int, name: str, physics: Snapshot) -> None:
         """An object is no longer held; `physics`: of the world from now on."""
         self._worlds[world].held.remove(name)
+        self.put(world, physics)
+
+    def put(self, world: int, physics: Snapshot) -> None:
+        """`physics`: of a world from now on."""
         self._worlds[world].physics = physics
 
     def make_true(self, world: int, step: Step, conditions: Sequence[Condition] | None = None) -> Outcome | None:
