@@ -1,15 +1,16 @@
-"""What the kinematic rung opens stands as wide open as hands open it: the sampler's joints are anywhere where `open`
-holds, and a hand has no way through a gap of some centimetres."""
+"""What the kinematic rung opens: the door, drawer or lid that a hand is at, as wide as hands open it. The sampler opens
+any joint of an object, anywhere where `open` holds, and leaves a hand no way to what is behind another one, or through
+a gap of some centimetres."""
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Float
 
 from ig2mj.engine.snapshot import Snapshot
-from ig2mj.planning.joints import OPEN_TO
+from ig2mj.planning.joints import OPEN_TO, OpenableJoint, openable_joints
 from ig2mj.sampling.joints import JointMover
 from ig2mj.sampling.query import SceneQuery
-from ig2mj.scene.tables import SceneTables
 
 TRIED = (OPEN_TO, 0.9, 1.0, 0.5)
 """Shares of their range to which joints are opened, in this order: those that a hand reaches first, then those at which
@@ -19,25 +20,40 @@ OPEN_FROM = 0.05
 """Share of a joint's range from which on it is one of those that have been opened."""
 
 
-def opened_wide(query: SceneQuery, tables: SceneTables, index: int) -> Snapshot | None:
-    """The world of a query with the open joints of an object opened wide, at rest; None: they are, or do not rest so.
+def opened_wide(query: SceneQuery, index: int, hand: Float[np.ndarray, "3"] | None = None) -> Snapshot | None:
+    """The world of a query with joints of an object opened wide, at rest; None: they are, or do not rest so.
 
     Args:
-      query: in the state in which the object is open. tables: of its scene. index: number of the object.
+      index: number of the object. hand: m, world frame: the joint is opened whose link is nearest; None: all that are
+        open.
     """
-    own = tables.openable_object == index
-    now = np.asarray(query.view.joint_pos)[:, : len(own)]
-    range_ = tables.openable_open - tables.openable_closed
-    share = (now - tables.openable_closed) / range_
-    moves = own & (share > OPEN_FROM) & (share < OPEN_TO)
+    tables, model = query.scene.tables, query.scene.model
+    own = np.flatnonzero(tables.openable_object == index)
+    if hand is not None:
+        joints = openable_joints(query.scene, query.view, index)
+        if not joints:
+            return None
+        nearest = model.joint(min(joints, key=lambda joint: _apart(joint, hand)).name).qposadr[0]
+        own = own[tables.openable_qposadr[own] == nearest]
+    count, range_ = len(tables.openable_object), tables.openable_open - tables.openable_closed
+    before = np.asarray(query.view.joint_pos)[:, :count]
+    share = (before - tables.openable_closed) / range_
+    moves = np.isin(np.arange(count), own)[None] & (share < OPEN_TO)
+    if hand is None:
+        moves &= share > OPEN_FROM
     if not moves.any():
         return None
     mover = JointMover(query, index)
     for to in TRIED:
-        positions = np.where(share < to, tables.openable_closed + to * range_, now)
+        positions = np.where(share < to, tables.openable_closed + to * range_, before)
         if not mover.problem(mover.plan(positions, moves)):
-            rests = (np.asarray(query.view.joint_pos)[:, : len(own)] - tables.openable_closed) / range_
-            if (rests >= share)[moves].all():
+            rests = (np.asarray(query.view.joint_pos)[:, :count] - tables.openable_closed) / range_
+            if (rests >= np.maximum(share, OPEN_FROM))[moves].all():
                 return query.save()
         query.load(mover.before)
     return None
+
+
+def _apart(joint: OpenableJoint, point: Float[np.ndarray, "3"]) -> float:
+    """m from a point to the nearest place at which a link is taken."""
+    return min(float(np.linalg.norm(place - point)) for place, _ in (*joint.grips, *joint.edges, *joint.inner_grips))
