@@ -5,10 +5,10 @@ a gap of some centimetres."""
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ig2mj.engine.snapshot import Snapshot
-from ig2mj.planning.joints import OPEN_TO, OpenableJoint, openable_joints
+from ig2mj.planning.joints import OPEN_TO, STEPS, OpenableJoint, openable_joints
 from ig2mj.sampling.joints import JointMover
 from ig2mj.sampling.query import SceneQuery
 
@@ -18,6 +18,10 @@ a lid stays open that falls shut from there, at last half open."""
 
 OPEN_FROM = 0.05
 """Share of a joint's range from which on it is one of those that have been opened."""
+
+
+PUSHED = 0.05
+"""s in which what a step of a joint meets gives way."""
 
 
 def opened_wide(query: SceneQuery, index: int, hand: Float[np.ndarray, "3"] | None = None) -> Snapshot | None:
@@ -43,15 +47,24 @@ def opened_wide(query: SceneQuery, index: int, hand: Float[np.ndarray, "3"] | No
         moves &= share > OPEN_FROM
     if not moves.any():
         return None
-    mover = JointMover(query, index)
+    whole = query.save()
     for to in TRIED:
         positions = np.where(share < to, tables.openable_closed + to * range_, before)
-        if not mover.problem(mover.plan(positions, moves)):
-            rests = (np.asarray(query.view.joint_pos)[:, :count] - tables.openable_closed) / range_
-            if (rests >= np.maximum(share, OPEN_FROM))[moves].all():
-                return query.save()
-        query.load(mover.before)
+        _pull(query, index, positions, moves)
+        rests = (np.asarray(query.view.joint_pos)[:, :count] - tables.openable_closed) / range_
+        if (rests >= np.maximum(share, OPEN_FROM))[moves].all():
+            return query.save()
+        query.load(whole)
     return None
+
+
+def _pull(query: SceneQuery, index: int, positions: Float[np.ndarray, "1 J"], moves: Bool[np.ndarray, "1 J"]) -> None:
+    """Moves joints there in steps, so that what is in the way, or lies in a drawer, is pushed along."""
+    before = np.asarray(query.view.joint_pos)[:, : positions.shape[1]].copy()
+    for part in np.linspace(0.0, 1.0, STEPS + 1)[1:]:
+        query.write(JointMover(query, index).plan(before + part * (positions - before), moves).write)
+        query.settle(PUSHED)
+    query.settle()
 
 
 def _apart(joint: OpenableJoint, point: Float[np.ndarray, "3"]) -> float:
