@@ -7,11 +7,12 @@ import types
 import numpy as np
 import pytest
 
-from ig2mj.planning import opening, opening_around
+from ig2mj.planning import doors, opening, opening_around
 from ig2mj.planning.joints import OPEN_TO, OpenableJoint
 from ig2mj.planning.opening_around import Tried, open_around, open_into
 from ig2mj.planning.spots import _shut_away
 from ig2mj.planning.steps import Step
+from ig2mj.planning.world import PlannedWorld
 
 OUT = np.array([0.0, -1.0, 0.0])
 
@@ -130,3 +131,37 @@ def test_fingers_that_push_a_door_point_to_its_hinge_and_turn_with_it():
     world = types.SimpleNamespace(body=types.SimpleNamespace(turned=lambda hand, fingers, palm: (fingers, palm)))
     along, palm = opening._turned(world, 0, plan, turned)  # pyright: ignore
     assert np.allclose(palm, -turned) and abs(along @ palm) < 1e-9 and along @ fingers > 0.7
+
+
+def test_a_door_between_rooms_that_is_ajar_is_pushed_open_from_its_inner_side():
+    def pulls(fraction, between_rooms=True, gap=None):
+        domain = types.SimpleNamespace(is_door=lambda name: between_rooms, fixed=lambda name: True)
+        world = types.SimpleNamespace(domain=domain, body=types.SimpleNamespace(opening=gap))
+        return [way[2] for way in opening._ways(world, _door(fraction), True)]
+
+    assert pulls(0.3) == [False, True, True]
+    assert pulls(0.1) == pulls(0.3, between_rooms=False) == pulls(0.3, gap=0.1) == [True, True, False]
+
+
+@pytest.mark.parametrize("opens_to, swings", [(1.0, 4), (0.5, 3)])
+def test_a_door_in_the_way_is_opened_as_wide_as_it_goes(monkeypatch, opens_to, swings):
+    """Where it ends before that, it does if it is in the way no longer."""
+    door, asked = [_door(0.0)], []
+
+    def move_joint(world, joint, hand, value, tried, to):
+        asked.append(to)
+        door[0] = _door(min(to, opens_to))
+        yield []
+
+    monkeypatch.setattr(doors, "joints_of", lambda world, name: door)
+    monkeypatch.setattr(doors, "move_joint", move_joint)
+    monkeypatch.setattr(doors, "free_hand", lambda world, attempt: 0)
+    monkeypatch.setattr(doors, "door_in_the_way", lambda world, step: None if door[0].fraction > 0.4 else "door")
+    monkeypatch.setattr(doors, "HandedBody", types.SimpleNamespace)
+    world = object.__new__(PlannedWorld)
+    world.body = types.SimpleNamespace()  # pyright: ignore
+    swung = doors._swing(world, "door", Step("navigate_to", ("plate",)))
+    with pytest.raises(StopIteration) as end:
+        while True:
+            next(swung)
+    assert end.value.value is None and len(asked) == swings

@@ -74,8 +74,9 @@ def _through_doors(world: PlannedWorld, step: Step, action: Action) -> Primitive
 
 
 def _swing(world: PlannedWorld, door: str, step: Step) -> Generator[Program, str, str | None]:
-    """Opens a door by short swings, each from a new stance, until it is in the way no longer. None, or why it still is,
-    in words; "" for a robot that opens no doors."""
+    """Opens a door by short swings, each from a new stance, as wide as it goes: a base that drives close by a leaf
+    brushes it, and swings it shut. None, or why it still is in the way, in words; "" for a robot that opens no doors.
+    """
     if not isinstance(world.body, HandedBody):
         return ""
     tried = 0
@@ -85,11 +86,11 @@ def _swing(world: PlannedWorld, door: str, step: Step) -> Generator[Program, str
             break
         before, to = shut[0].fraction, min(shut[0].fraction + SWING, 1.0)
         yield from move_joint(world, shut[0], free_hand(world, attempt), True, tried, to)
-        now = {j.name: j.fraction for j in joints_of(world, door)}[shut[0].name]
-        tried = 0 if now - before > MOVED else tried + attempt % 2
-        if door_in_the_way(world, step) != door:
-            return None
-    return ", and no hand can move it"
+        moved = {j.name: j.fraction for j in joints_of(world, door)}[shut[0].name] - before > MOVED
+        tried = 0 if moved else tried + attempt % 2
+        if not moved and door_in_the_way(world, step) != door:
+            break
+    return None if door_in_the_way(world, step) != door else ", and no hand can move it"
 
 
 def door_in_the_way(world: PlannedWorld, step: Step) -> str | None:

@@ -182,16 +182,19 @@ def _moved(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointPla
 def withdraw(world: PlannedWorld, hand: int) -> Program:
     """The empty hand goes back to where it rests, around what it has moved: else it lifts a light box by its open lid.
 
-    Where the hand touches the link, it first goes straight off it.
+    Where the hand touches the link, it first goes straight off it. It keeps clear of all by its spheres where it can: a
+    leaf that is brushed swings on.
     """
     fingers, palm = world.hand_axes(hand)
-    spheres, obstacles = world.spheres(fingers, palm) * (1.0, 1.0, 1.0, AT_OBJECT), world.obstacles()
+    spheres, obstacles = world.spheres(fingers, palm), world.obstacles()
     start, end = world.grip(hand), world.resting(hand, world.stance)
-    for off in (-palm, -ahead(world.stance.yaw), UP, -fingers):
-        for apart in OFF:
-            way = hand_way(obstacles, spheres, start + apart * off, end)
-            if way is not None:
-                return [*travel(hand, [start + apart * off, *way], None), *rest(hand)]
+    for share in (1.0, AT_OBJECT):
+        there = spheres * (1.0, 1.0, 1.0, share)
+        for off in (-palm, -ahead(world.stance.yaw), UP, -fingers):
+            for apart in OFF:
+                way = hand_way(obstacles, there, start + apart * off, end)
+                if way is not None:
+                    return [*travel(hand, [start + apart * off, *way], None), *rest(hand)]
     return rest(hand)
 
 
@@ -213,11 +216,15 @@ def _ways(
 ) -> list[tuple[tuple[FaceGrip, ...], float, bool]]:
     """Grips, share of the joint's range to which they move it, and whether the hand pulls: a door is pulled open by its
     outer face or its edge, and pushed shut by its outer face. Where no floor is free before that, it is pulled by its
-    edge until it is nearly shut, or by its inner face until it is ajar; a door between rooms, until it is shut. A lid
-    or flap, which hands do not take hold of, is lifted by fingers below its edge, and pushed where it is ajar."""
+    edge until it is nearly shut, or by its inner face until it is ajar; a door between rooms, until it is shut. A door
+    between rooms that is ajar is pushed open by a hand that floats: else robot or hand end behind its leaf, and swing
+    it shut as they come around that. A lid or flap, which hands do not take hold of, is lifted by fingers below its
+    edge, and pushed where it is ajar."""
     between_rooms = _is_between_rooms(world, joint)
     if value and _is_held(world, joint):
-        return [(joint.grips, to, True), (joint.edges, to, True), (joint.inner_grips, to, False)]
+        ways = [(joint.grips, to, True), (joint.edges, to, True), (joint.inner_grips, to, False)]
+        pushed = between_rooms and joint.fraction > AJAR and world.body.opening is None
+        return [ways[-1], *ways[:-1]] if pushed else ways
     if value:
         ways = [(joint.grips, to, True), (joint.edges, to, True), (joint.inner_grips, to, False)]
         return ways if joint.fraction < LIFTED else ways[::-1]
@@ -400,10 +407,8 @@ def _program(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointP
             hand=hand, pos=vector3(first + NEAR * normal), quat=quat, tolerance=0.01, limit=12, after="", speed=COMING
         )
         limit = 20 + int(np.linalg.norm(places[1][0] - first) / speed)
-        # A palm is in the face that it holds: what slides, and a door that was pulled shut, is pushed back where it
-        # stays there while it opens.
-        leaves = floats and (not joint.hinge or plan.to < joint.fraction)
-        off = vector3(places[-1][0] + RETREAT * places[-1][1]) if leaves else None
+        # A palm is in the face that it holds, and would push that back where it stayed there while it opens.
+        off = vector3(places[-1][0] + RETREAT * places[-1][1]) if floats else None
         program += [
             *([near] if floats else []),
             Phase(hand=hand, pos=vector3(first - PUSH_IN * normal), quat=quat, until=Until.TOUCHED, object=index,
