@@ -51,6 +51,13 @@ def test_a_way_begins_outside_of_a_pocket_unless_furniture_shuts_it_off(still):
     assert np.isfinite(floor.distances(robot, 0.5)).sum() == (25 if still else floor.free.sum() - 25)
 
 
+def test_floor_that_a_leaf_shuts_off_is_joined_to_itself_alone():
+    """A way to it begins outside; a leaf that leaves it shut off is not the one that is in the way."""
+    floor = floor_with_pocket()
+    assert floor.joined((42.5 * RESOLUTION, 42.5 * RESOLUTION)).sum() == 25
+    assert floor.joined((10.5 * RESOLUTION, 10.5 * RESOLUTION)).sum() == floor.free.sum() - 25
+
+
 def test_a_robot_that_leans_on_furniture_begins_its_way_next_to_it():
     free = np.ones((80, 80), bool)
     free[30:50, 30:50] = False

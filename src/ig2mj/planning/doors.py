@@ -174,7 +174,7 @@ def leaf_in_the_way(world: PlannedWorld, step: Step) -> _Leaf | None:
         shut = joints(scene.model.nq, tables.openable_qposadr[own], tables.openable_closed[own])
         world.query.write(shut)
         floor = world.floor(view=world.query.view)
-        near = reached & np.isfinite(floor.distances(goal))
+        near = reached & floor.joined(goal)
         if near.any():
             return _Leaf(tables.object_names[door], floor, near)
     return None

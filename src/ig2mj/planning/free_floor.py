@@ -112,6 +112,16 @@ class FreeFloor:
         start = self.begin(xy, within)
         return np.full(self.free.shape, np.inf) if start is None else self._field(start)[0]
 
+    def joined(self, xy: Point) -> Bool[np.ndarray, "h w"]:
+        """Cells with a way to the free one nearest to a point, within `NEAR_GOAL`: that may be in a pocket, outside
+        of which `distances` begins."""
+        there = self.nearest(xy, NEAR_GOAL)
+        return (
+            np.zeros(self.free.shape, bool)
+            if there is None
+            else self.free & (self._labels == self._labels[tuple(there)])
+        )
+
     def way(self, start: Point, goal: Point) -> Float[np.ndarray, "N 2"] | None:
         """Points of a way between two positions, straightened; None where there is none."""
         begin, end = self.begin(start, NEAR_START), self.nearest(goal, NEAR_GOAL)
