@@ -6,7 +6,7 @@ import types
 import numpy as np
 import pytest
 
-from ig2mj.planning import clutter, placing
+from ig2mj.planning import clutter, grasping, placing
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.world import PlannedWorld
 
@@ -177,3 +177,22 @@ def test_a_container_that_fell_over_with_what_is_to_be_taken_is_set_up(monkeypat
     monkeypatch.setattr(World, "facts", types.SimpleNamespace(containers=lambda name: ("fridge", "box")))
     monkeypatch.setattr(clutter, "is_tipped", lambda world, name: tipped)
     assert clutter.fallen_around(world, Step(primitive, ("cup",))) == found
+
+
+def test_poses_that_have_failed_are_remembered_until_the_object_lies_elsewhere():
+    class Lying(PlannedWorld):
+        corners = np.zeros((8, 3))
+
+        def vertices(self, name):
+            return self.corners
+
+    world = object.__new__(Lying)
+    world.vain, world.body = {}, types.SimpleNamespace(opening=None)  # pyright: ignore
+    tried = grasping.tried_in_vain(world, "pen")
+    tried.append("pose")  # pyright: ignore
+    assert grasping.tried_in_vain(world, "pen") == ["pose"] and grasping.tried_in_vain(world, "book") == []
+    world.corners = np.full((8, 3), 2 * grasping.SAME)
+    assert grasping.tried_in_vain(world, "pen") == []
+    grasping.tried_in_vain(world, "pen").append("pose")  # pyright: ignore
+    world.body.opening = 0.1  # a gripper has fewer tries in later requests
+    assert grasping.tried_in_vain(world, "pen") == []

@@ -58,6 +58,9 @@ MAKES_ROOM = 0.02
 MOVED = 0.03
 """m that an object has moved beyond which its grasp is planned again."""
 
+SAME = 0.01
+"""m up to which the corners of an object that lies as before have moved."""
+
 RESTS = 15
 """Agent steps in which what has moved comes to rest."""
 
@@ -96,7 +99,7 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         return Outcome()
     if not is_graspable(world, name):
         return Outcome("no_grasp", f"{name} is fixed, or its category allows no assisted grasp")
-    reason, detail, tried, moved = "no_grasp", "", list[GraspPose](), Tried()
+    reason, detail, tried, moved = "no_grasp", "", tried_in_vain(world, name), Tried()
     most = ATTEMPTS if world.body.opening is None else ARM_ATTEMPTS
     nowhere, missed, attempts = 0, 0, tries_left(most, world.missed[f"grasp {name}"], world.body.opening)
     for attempt in range(attempts):
@@ -116,6 +119,9 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
             found = _plan(world, name, hand, tried, prefers)
         if found is None:
             found = _plan(world, name, hand, tried, prefers, AT_OBJECT)
+        if found is None and tried and not missed:  # all others have failed before
+            tried.clear()
+            found = _plan(world, name, hand, tried, prefers) or _plan(world, name, hand, tried, prefers, AT_OBJECT)
         if found is None:
             reason, detail = "no_base", f"no free floor from which a hand has a way to {name}"
             if not tried and world.body.opening is not None and not grasp_poses(world, name, world.obstacles([name])):
@@ -136,9 +142,21 @@ def grasp(world: PlannedWorld, step: Step, prefers: Prefers | None = None) -> Pr
         reason, detail = yield from _take(world, name, hand, pose, attempt)
         if name in world.held:
             world.missed[f"grasp {name}"] = 0
+            world.vain.pop(name, None)
             return Outcome(attempts=missed)
         world.missed[f"grasp {name}"] += 1
     return Outcome(reason or "no_grasp", detail, attempts=max(missed, 1))
+
+
+def tried_in_vain(world: PlannedWorld, name: str) -> list[GraspPose]:
+    """Poses of a floating hand with which earlier requests of the episode have not taken an object that lies as it did:
+    they fail again. What is appended to the list is remembered."""
+    corners, floats = world.vertices(name), world.body.opening is None
+    before, poses = world.vain.get(name, (corners, []))
+    if not floats or np.abs(corners - before).max() > SAME:
+        before, poses = corners, []
+    world.vain[name] = before, poses
+    return poses
 
 
 def held_again(world: PlannedWorld, name: str) -> Generator[Program, str, bool]:

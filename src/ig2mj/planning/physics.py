@@ -11,6 +11,7 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -104,6 +105,7 @@ class PhysicsRung:
         self._carry = execution.begin(self._programs)
         self._count, self._steps, self._planning = [0] * count, [0] * count, [0.0] * count
         self._missed = [collections.Counter[str]() for _ in range(count)]
+        self._vain = [dict[str, Any]() for _ in range(count)]
         self._ended: dict[int, Outcome] = {}
         self.watch: Callable[[], None] = lambda: None
 
@@ -117,7 +119,7 @@ class PhysicsRung:
             self._query = SceneQuery(self.stage.scene)
         rng = np.random.default_rng([self._seed, self._numbers[world], self._count[world]])
         found = PlannedWorld(self.stage, self.body, self.domain, self._planner, self._query, world, rng)
-        found.missed = self._missed[world]
+        found.missed, found.vain = self._missed[world], self._vain[world]
         return found
 
     def facts(self, world: int) -> Facts:
@@ -236,6 +238,7 @@ class PhysicsRung:
         self.stop(world)
         self._ended.pop(world, None)
         self._missed[world].clear()
+        self._vain[world].clear()
         self._numbers[world], self._count[world], self._asked[world] = number, 0, None
 
     def program(self, world: int) -> Program:

@@ -88,6 +88,8 @@ class PlannedWorld:
     Attributes:
       stage, body, domain, planner: of all worlds. query: a world of the scene on the native engine, to sample spots in.
       missed: how often in this episode a gripper has tried something in vain, by what that was (`moves.tries_left`).
+      vain: what was tried in vain in this episode to take hold of an object, by its name, and where its corners were
+        (`grasping.tried_in_vain`).
       world: number. rng: of this primitive. crosses: a base on wheels drives over edges of carpets, at which it may get
         stuck.
     """
@@ -101,6 +103,7 @@ class PlannedWorld:
     rng: np.random.Generator
     crosses: bool = False
     missed: collections.Counter[str] = dataclasses.field(default_factory=collections.Counter)
+    vain: dict[str, tuple[Float[np.ndarray, "V 3"], list[Any]]] = dataclasses.field(default_factory=dict)
     _points: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
     _kept: tuple[PhysicsView, dict[Any, Any]] | None = dataclasses.field(default=None, init=False)
     _sensed: tuple[PhysicsView, Senses] | None = dataclasses.field(default=None, init=False)
