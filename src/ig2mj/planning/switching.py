@@ -102,7 +102,9 @@ def toggle(value: bool) -> Callable[[PlannedWorld, Step], Primitive]:
             stance, number, slope = found
             if reason := (yield from go(world, stance)):
                 continue
+            planned, _ = pressings(button, towards(stance.xy, button), slope)[number]
             pressing, _ = pressings(button, towards(world.base[0], button), slope)[number]
+            pressing = dataclasses.replace(pressing, aim=planned.aim)  # which is known to have room
             quat = world.body.turned(hand, pressing.fingers, pressing.palm)
             way = yield from from_home(world, hand, functools.partial(_way, world, hand, pressing))
             if way is None:
