@@ -55,7 +55,8 @@ def main() -> None:
             if main:
                 take_in(main, args.results / f"{rung}.jsonl")
             if rung == "physics":
-                take_in_comparisons([row for row in rows if condition_of(row)], main, args.results / COMPARISONS)
+                kept_main = read_lines(args.results / f"{rung}.jsonl")
+                take_in_comparisons([row for row in rows if condition_of(row)], kept_main, args.results / COMPARISONS)
     if args.requests:
         take_in_requests([row for file in args.requests for row in read_lines(file)], args.results / REQUESTS)
     kept = {rung: read_lines(args.results / f"{rung}.jsonl") for rung in RUNGS}
@@ -138,9 +139,14 @@ def condition_of(row: Row) -> str:
 
 
 def take_in_comparisons(rows: Sequence[Row], main: Sequence[Row], file: pathlib.Path) -> None:
-    """Replaces the lines of the rows' conditions at their commits. `main`: main rows, for those of the same starts."""
+    """Replaces the lines of the rows' conditions at their commits. `main`: lines of the main rows, for those of the
+    same starts."""
     known = {(line["condition"], *line["commits"]): line for line in read_lines(file)}
-    solved = {(row["activity"], row["start"]): int(row["success"]) for row in main}
+    solved = {
+        (line["activity"], start): int(success)
+        for line in main
+        for start, success in zip(line["starts"], line["success"], strict=True)
+    }
     for condition, commit in sorted({(condition_of(row), row["commit"]) for row in rows}):
         own = [row for row in rows if (condition_of(row), row["commit"]) == (condition, commit)]
         failed = collections.Counter(
@@ -152,6 +158,7 @@ def take_in_comparisons(rows: Sequence[Row], main: Sequence[Row], file: pathlib.
             "activities": len({row["activity"] for row in own}),
             "starts": len(own),
             "solved": sum(row["success"] for row in own),
+            "solved_activities": sorted({row["activity"] for row in own if row["success"]}),
             "q": round(statistics.mean(row["q"] for row in own), 3),
             "main_starts": len(same),
             "main_solved": sum(same),

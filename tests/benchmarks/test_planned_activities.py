@@ -85,9 +85,12 @@ def test_other_agents_are_compared_on_the_same_starts_and_leave_the_main_rows_al
     other = [row for row in run(arguments).values() if "agent" in row["conditions"]]
     assert len(other) == 3 and not any(pages.condition_of(row) for row in main)
     other[0] |= {"success": False, "q": 0.0, "steps": [{**STEP, "reason": "no_grasp"}]}
+    pages.take_in(main, tmp_path / "physics.jsonl")
+    main = pages.read_lines(tmp_path / "physics.jsonl")
     pages.take_in_comparisons(other, main, tmp_path / "comparisons.jsonl")
     (line,) = pages.read_lines(tmp_path / "comparisons.jsonl")
     commit = other[0]["commit"]
+    assert line["solved_activities"] == [other[0]["activity"]]
     text = pages.page({"physics": []}, (), [line])
     assert f"| `--agent random` | {commit} | 1 | 3 | 2 | 3 of 3 | 0.67 | open: no_grasp (1) |" in text
     again = [{**row, "commit": "0abcdef0"} for row in other[1:]]
