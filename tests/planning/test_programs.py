@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ig2mj.planning import execution
-from ig2mj.planning.phases import Phase, Programs, Until
+from ig2mj.planning.phases import LIMIT, Phase, Programs, Until
 from ig2mj.planning.senses import Senses
 
 
@@ -25,7 +25,7 @@ def test_behind_the_end_of_a_new_program_nothing_of_the_old_one_is_left():
     new = long.with_rows(np.array([1]), Programs.pack([[Phase(yaw=2.0, rise=0.3)]]))
     assert new.length.tolist() == [4, 1] and long.length.tolist() == [4, 4] and (long.phases["yaw"] == 1.0).all()
     assert new.phases["yaw"].tolist() == [[1.0] * 4, [2.0, 0.0, 0.0, 0.0]]
-    assert new.phases["limit"][1, 1:].tolist() == [0, 0, 0]
+    assert new.phases["limit"][1, 1:].tolist() == [LIMIT] * 3 and (new.phases["hand"][1, 1:] == -1).all()
     np.testing.assert_array_equal(new.phases["rise"][1], np.float32([0.3, np.nan, np.nan, np.nan]))
 
 

@@ -57,7 +57,7 @@ def test_the_body_stays_at_its_height_where_nothing_else_is_asked(robot):
     carry = execution.begin([[Phase(hand=0, reset=True)]])
     action, _ = execution.advance(body, 0, carry, view)
     assert action[0, names.index("body_z")] == pytest.approx(0.0, abs=0.01)
-    assert np.isnan(Programs.pack([[Phase()]]).rise).all()
+    assert np.isnan(Programs.pack([[Phase()]]).phases["rise"]).all()
 
 
 class _Roof(Obstacles):

@@ -120,9 +120,8 @@ _READ: Mapping[str, tuple[Callable[[Phase], Any], Any]] = {
 
 _PHASE = np.dtype([(name, *(kind if isinstance(kind, tuple) else (kind,))) for name, (_, kind) in _READ.items()])
 
-_BEHIND = np.zeros((), _PHASE)
-"""A phase behind the end of a program."""
-_BEHIND["rise"] = np.nan
+_BEHIND = np.array(tuple(read(Phase()) for read, _ in _READ.values()), _PHASE)
+"""A phase behind the end of a program, which does nothing."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
