@@ -277,12 +277,12 @@ class KinematicRung:
         robot, tables = self._robots[world], self.domain.model.tables
         name = tables.object_names[index]
         if self.domain.fixed(name):
-            value = step.primitive != "close" or step.object != name
-            grip = robot.hands[hand][0] + quat_rotate(robot.hands[hand][1], self.body.grips[hand])
-            if value and self._open_wide(world, name, grip):
-                return ""
-            failed = self._symbolic.make_true(world, step, [Condition("open", (name,), value)])
-            return "" if failed is None else "not_true_after"
+            if step.primitive == "close" and step.object == name:
+                failed = self._symbolic.make_true(world, step, [Condition("open", (name,), False)])
+                return "" if failed is None else "not_true_after"
+            pos, quat = robot.hands[hand]
+            self._open_wide(world, name, pos + quat_rotate(quat, self.body.grips[hand]))
+            return "" if self.facts(world).holds("open", name) else "not_true_after"
         query = self._symbolic.show(world)
         pos, quat = (np.asarray(a)[0, index].astype(float) for a in (query.view.object_pos, query.view.object_quat))
         robot.held[hand], robot.grasps[hand] = name, _in(robot.hands[hand], (pos, quat))
@@ -290,12 +290,11 @@ class KinematicRung:
             self._symbolic.hold(world, name)
         return ""
 
-    def _open_wide(self, world: int, name: str, hand: Float[np.ndarray, "3"] | None = None) -> bool:
-        """Opens what a hand is at (None: what has been opened) as wide as a hand does; whether it stays so."""
+    def _open_wide(self, world: int, name: str, hand: Float[np.ndarray, "3"] | None = None) -> None:
+        """Opens what a hand is at (None: what has been opened) as wide as a hand does, if it stays so."""
         physics = opened_wide(self._symbolic.show(world), self._bare.index(name), hand)
         if physics is not None:
             self._symbolic.put(world, physics)
-        return physics is not None
 
     def _let_go(self, world: int, hand: int) -> None:
         """Lets go of what a hand holds; it comes to rest."""
