@@ -19,30 +19,32 @@ import concurrent.futures
 import dataclasses
 import functools
 import json
+import multiprocessing
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
+from multiprocessing.connection import Connection
 from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ig2mj.engine.base import GATHERED
+from ig2mj.engine.mjx.packed_rows import PackedRows
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.planning_processes import PlanningProcesses
 from ig2mj.envs.planning_stage import EnvironmentStage
+from ig2mj.envs.state import EnvState
 from ig2mj.errors import Ig2mjError
 from ig2mj.planning import execution
 from ig2mj.planning.body_kinds import body_of
 from ig2mj.planning.phases import Programs
 from ig2mj.planning.physics import check_robot
+from ig2mj.planning.senses import Senses, sensed, senses_of
 from ig2mj.planning.solver import EpisodeResult
 from ig2mj.process.worker_threads import WorkerThreads
-
-LISTENING = 0.001
-"""s that answers are waited for at a time while the worlds are stepped."""
 
 SETTING_OUT = 0.004
 """s for which a step has the interpreter for itself, so that the device begins it at once."""
@@ -67,14 +69,27 @@ class PlannedEpisode:
     seconds: float
 
 
+@dataclasses.dataclass(frozen=True)
+class Results:
+    """What is read of all worlds after an agent step.
+
+    Attributes:
+      senses: of the robot. terminated: its goal ended the episode. truncated: the horizon or a guard did.
+    """
+
+    senses: Senses
+    terminated: Bool[np.ndarray, "W"]
+    truncated: Bool[np.ndarray, "W"]
+
+
 @dataclasses.dataclass
 class Spent:
     """Wall time of a run, by what it was spent on.
 
     Attributes:
-      stepping: s in the environment's step, until its results are there. following: s in which programs are followed,
-        and answers read while the environment does not step. copying: s in which worlds are copied, handed over, and
-        answers read after the environment's step has ended.
+      stepping: s in the environment's step, until its results are on the host. following: s in which programs are
+        followed, and answers read while the environment does not step. copying: s in which worlds are copied, handed
+        over, and answers read after the environment's step has ended.
         blocked: s in which no world had a program.
       world_steps: agent steps of all worlds. waited: of these, those in which a world held still for its planner.
       planned: processor s of all processes. programs: that were planned.
@@ -105,7 +120,7 @@ class PlannedBatch:
 
     Attributes:
       env: the environment. stage: its worlds. body: how programs move the robot. planners: who plans.
-      spent: of all runs.
+      spent: of all runs. stepped: has a message where a step has ended.
     """
 
     def __init__(self, env: Environment, processes: int = 0, seed: int = 0):
@@ -123,6 +138,10 @@ class PlannedBatch:
         self.body = body_of(env.scene, self.stage.controller, 0)
         self.planners = PlanningProcesses(env, processes, seed)
         self._stepper = WorkerThreads(1, "steps")
+        self.stepped, self._tell = multiprocessing.Pipe(duplex=False)
+        self._every = np.arange(env.num_worlds, dtype=np.int32)
+        self._packed = PackedRows(lambda *read: read)
+        self._read_of: tuple[EnvState, Results] | None = None
 
     def run(
         self,
@@ -191,18 +210,34 @@ class PlannedBatch:
 
     def begin_step(self, action: Float[np.ndarray, "W n"]) -> Future[float]:
         """Begins an agent step of all worlds, in a thread: the call of a program returns when the device has decided
-        its last branch. The result is when the worlds were there, s of `time.perf_counter`."""
+        its last branch. The result is when the worlds were there, s of `time.perf_counter`; `stepped` has a message
+        then."""
         return self._stepper.submit(self._stepped, action)
 
     def _stepped(self, action: Float[np.ndarray, "W n"]) -> float:
-        self.stage.act(action)
-        jax.device_get((self.stage.state.terminated, self.stage.state.truncated))  # arrays keep what was copied
-        return time.perf_counter()
+        try:
+            self.stage.act(action)
+            self.results()
+            return time.perf_counter()
+        finally:
+            self._tell.send_bytes(b"\0")
+
+    def results(self) -> Results:
+        """Of the worlds as they are now; copied once for each state, as one array."""
+        state = self.stage.state
+        if self._read_of is None or self._read_of[0] is not state:
+            read = sensed(state.batch.world.view, self.body.friction is not None), state.terminated, state.truncated
+            arrays, terminated, truncated = self._packed.begin(self._every, *read)()
+            senses = senses_of(arrays, self.stage.agent, self.body.hands, self.body.friction)
+            self._read_of = state, Results(senses, terminated, truncated)
+        return self._read_of[1]
 
     def close(self) -> None:
         """Ends the processes that plan, and the thread that steps; may be called twice."""
         self._stepper.__exit__(None)
         self.planners.close()
+        self.stepped.close()
+        self._tell.close()
 
     def __enter__(self) -> PlannedBatch:
         return self
@@ -313,10 +348,10 @@ class _Episodes:
         )
         return bool(self.carry.running.any())
 
-    def _take(self, wait: float | None) -> None:
-        """Takes answers that are there. `wait`: see `PlanningProcesses.answers`."""
+    def _take(self, wait: float | None, unless: Connection | None = None) -> None:
+        """Takes answers that are there. `wait`, `unless`: see `PlanningProcesses.answers`."""
         before = self.planners.seconds
-        for world, answer in self.planners.answers(wait):
+        for world, answer in self.planners.answers(wait, unless):
             if world not in self.numbers:
                 continue
             if isinstance(answer, Programs):
@@ -340,7 +375,7 @@ class _Episodes:
     def _step(self) -> None:
         """An agent step of all worlds, and requests for those whose programs have ended."""
         spent, stage, began = self.spent, self.stage, time.perf_counter()
-        action, self.carry = execution.advance(self.batch.body, stage.agent, self.carry, stage.view)
+        action, self.carry = execution.advance_sensed(self.batch.body, self.carry, self.batch.results().senses)
         spent.following += time.perf_counter() - began
         began = time.perf_counter()
         self.steps += 1
@@ -349,14 +384,16 @@ class _Episodes:
         step = self.batch.begin_step(action)
         concurrent.futures.wait([step], SETTING_OUT)
         self._hand_over()
-        while self.planners.asked and not self.planners.here and not step.done():
-            self._take(LISTENING)
+        while self.planners.asked and not self.planners.here and not self.batch.stepped.poll():
+            self._take(None, self.batch.stepped)
+        self.batch.stepped.recv_bytes()
         stepped = step.result()
         spent.stepping += stepped - began
-        terminated, truncated = np.asarray(stage.state.terminated), np.asarray(stage.state.truncated)
-        for world in np.flatnonzero(terminated | truncated).tolist():
+        results = self.batch.results()
+        for world in np.flatnonzero(results.terminated | results.truncated).tolist():
             if world in self.numbers:
-                self._ended(world, bool(terminated[world]), stage.ended(world) or "")
+                success = bool(results.terminated[world])
+                self._ended(world, success, "" if success else stage.ended(world) or "")
         busy = self.planners.asked | self.fresh.keys()
         ended = [w for w in np.flatnonzero(~self.carry.running).tolist() if w in self.numbers and w not in busy]
         seconds = (self.steps - self.begun) * self.env.period

@@ -151,11 +151,14 @@ class PlanningProcesses:
             self._pending[number] = len(requests)
             self._pipes[number].send(requests)
 
-    def answers(self, wait: float | None = 0.0) -> Iterator[tuple[int, PackedAnswer]]:
+    def answers(
+        self, wait: float | None = 0.0, unless: multiprocessing.connection.Connection | None = None
+    ) -> Iterator[tuple[int, PackedAnswer]]:
         """Worlds and their answers that are there; an error of one of them is its answer.
 
         Args:
-          wait: s until there is at least one, at most; None: however long it takes.
+          wait: s until there is at least one, at most; None: however long it takes. unless: has a message that ends the
+            wait.
 
         Raises:
           EngineError: a process has ended.
@@ -166,7 +169,8 @@ class PlanningProcesses:
                 assert self._copies is not None
                 yield self._took(_answer(self._here, self._copies, request))
             return
-        ready = multiprocessing.connection.wait(self._pipes, wait if self.asked else 0.0)
+        others = () if unless is None else (unless,)
+        ready = multiprocessing.connection.wait([*self._pipes, *others], wait if self.asked else 0.0)
         for number in (k for k, p in enumerate(self._pipes) if p in ready):
             for answer in self._received(number):
                 yield self._took(answer)

@@ -31,7 +31,7 @@ from ig2mj.geometry.host_rotations import (
 )
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.phases import Base, Phase, Until
-from ig2mj.planning.senses import FrictionHolds, Senses, grip_of
+from ig2mj.planning.senses import FrictionHolds, Senses, acting_grip
 from ig2mj.scene.scene import Scene
 
 AHEAD = 0.35
@@ -95,7 +95,8 @@ class Body(Protocol):
       size: n. friction: what its hands hold by friction alone; None: they hold by constraints. hands: numbers of its
         hands among all hands of the scene. grips: [H, 3] m, the point with which each hand takes hold, in its frame.
       sideways: its base moves in any direction. stands: m, height of a body that hovers; else 0. climbs: it passes over
-        edges of carpets.
+        edges of carpets. opening: m between the fingers of an arm's gripper; None: hands float, and take hold with the
+        palm, or there are none.
     """
 
     size: int
@@ -105,6 +106,7 @@ class Body(Protocol):
     sideways: bool
     stands: float
     climbs: bool
+    opening: float | None
 
     def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
         """The controller's action of the present phases."""
@@ -156,7 +158,6 @@ class HandedBody(Body, Protocol):
       arm: bodies, of the scene, that move with the hands and do not count where the robot stands.
       rises: m by which the body stoops, and stretches, for what its hands do not reach otherwise.
       tucked: [H, 3] m, where empty hands are in narrow places; None: as they are.
-      opening: m between the fingers of a gripper; None: a hand that takes hold with its palm.
       lifts: kg that one hand lifts; where it lifts less than an object's mass, two hands take it.
     """
 
@@ -169,7 +170,6 @@ class HandedBody(Body, Protocol):
     trunk: tuple[float, float]
     resting: tuple[float, float, float] | None
     arm: Int[np.ndarray, "n"]
-    opening: float | None
     rises: tuple[float, float]
     tucked: Float[np.ndarray, "H 3"] | None
     stands: float
@@ -220,6 +220,7 @@ class _Body:
     stands = 0.0
     climbs = False
     friction: FrictionHolds | None = None
+    opening: float | None = None
 
     def __init__(self, scene: Scene, controller: Controller, agent: int):
         robot = scene.agents[agent]
@@ -284,7 +285,6 @@ class HoveringBody(_Body):
     trunk = (BODY_RADIUS + 0.01, 2 * BODY_HEIGHT)
     resting = (0.56, 0.8, 0.33)
     rises = (-0.5, 0.25)
-    opening = None
 
     def __init__(self, scene: Scene, controller: Controller, agent: int):
         super().__init__(scene, controller, agent)
@@ -302,23 +302,22 @@ class HoveringBody(_Body):
     def command(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W n"]:
         action = np.tile(self._rest, (len(senses.base_pos), 1))
         action[:, self._places(*_BODY)] = self._base(senses, rows)
+        acts = np.flatnonzero(rows["hand"] >= 0)
+        if not len(acts):
+            return action
+        rows = {name: values[acts] for name, values in rows.items()}
+        hand, (move, turn) = rows["hand"], self._hand(senses.of(acts), rows)
         for number, control in enumerate(self._controls):
-            mine = rows["hand"] == number
-            follows = (rows["both"] > 0) & (rows["hand"] >= 0) & ~mine
-            if not (mine | follows).any():
-                continue
-            move, turn = self._hand(senses, rows, number)
-            for other in range(len(self._controls)) if follows.any() else ():
-                leads = follows & (rows["hand"] == other)
-                move = np.where(leads[:, None], self._hand(senses, rows, other)[0], move)
-            action[:, self._places(*control.move)] = np.where((mine | follows)[:, None], move, 0.0)
-            action[:, self._places(*control.turn)] = np.where(mine[:, None], turn, 0.0)
+            mine = hand == number
+            moves = mine | (rows["both"] > 0)
+            action[acts[moves, None], self._places(*control.move)] = move[moves]
+            action[acts[mine, None], self._places(*control.turn)] = turn[mine]
             closing = -control.opens * rows["closes"]
             close = np.where(rows["close"] < 0, 0.0, np.where(rows["close"] > 0, closing, control.opens))
-            action[:, self._places(control.close)] = np.where(mine | follows, close, 0.0)[:, None]
+            action[acts[moves], self._places(control.close)] = close[moves]
             reset = control.close.replace("trigger", "reset")
             if reset in self._names:
-                action[:, self._places(reset)] = np.where(mine & (rows["reset"] > 0), 1.0, 0.0)[:, None]
+                action[acts[mine], self._places(reset)] = rows["reset"][mine] > 0
         return action
 
     def _base(self, senses: Senses, rows: Rows) -> Float[np.ndarray, "W 6"]:
@@ -378,13 +377,10 @@ class HoveringBody(_Body):
     def follower(self, *_: Any) -> None:
         """None: the hands float."""
 
-    def _hand(
-        self, senses: Senses, rows: Rows, number: int
-    ) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"]]:
-        """Displacement and turn of one hand in the body's frame."""
-        base, quat = senses.base_quat, senses.hand_quat[:, number]
+    def _hand(self, senses: Senses, rows: Rows) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 3"]]:
+        """Displacement and turn of the acting hand in the body's frame; each world has one."""
+        base, (grip, quat) = senses.base_quat, acting_grip(senses, rows["hand"], self.grips)
         pos, required = goals_of_hand(senses, rows)
-        grip = grip_of(senses, number, self.grips[number])
         move = np.where(rows["moves"][:, None] > 0, np.asarray(quat_rotate_inverse(base, pos - grip)), 0.0)
         move *= np.minimum(1.0, rows["speed"] / np.maximum(np.asarray(length(move)), 1e-6))[:, None]
         left = np.asarray(quat_to_rotation_vector(quat_multiply(required, quat_conjugate(quat))))

@@ -13,9 +13,9 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.geometry.host_rotations import rotation_angle
-from ig2mj.planning.bodies import Body, HandedBody, Rows, goals_of_hand
+from ig2mj.planning.bodies import Body, Rows, goals_of_hand
 from ig2mj.planning.phases import REASON_NUMBERS, Base, Phase, Programs, Until
-from ig2mj.planning.senses import Senses, grip_of, sense
+from ig2mj.planning.senses import Senses, acting_grip, sense
 
 RUNNING, DONE = -1, 0
 """Statuses; larger ones are numbers of `REASON_NUMBERS`."""
@@ -49,9 +49,9 @@ class Carry:
     Attributes:
       programs: of all worlds. phase: number of the present one. steps: agent steps in it. status: of each world.
       rows: the present phases. rise: m by which bodies are asked to be above their height.
-      hand_pos, hand_quat: where hands were. still: agent steps of the present phase in which the acting one has not
-        moved. base: x, y and direction, m and rad, from which bases that are to move have not gone far in so many
-        agent steps of the present phase as `stood` says. stays: where bases that are to stay began to.
+      hand_pos, hand_quat: where hands were. still: agent steps of the present phase in which the acting one, of
+        an arm, has not moved. base: x, y and direction, m and rad, from which bases that are to move have not gone far
+        in so many agent steps of the present phase as `stood` says. stays: where bases that are to stay began to.
     """
 
     programs: Programs
@@ -112,11 +112,16 @@ def advance(body: Body, agent: int, carry: Carry, view: PhysicsView) -> tuple[Fl
     Args:
       view: of the present physics. Worlds whose programs have ended get an action that leaves everything as it is.
     """
-    senses = sense(view, agent, body.hands, body.friction)
+    return advance_sensed(body, carry, sense(view, agent, body.hands, body.friction))
+
+
+def advance_sensed(body: Body, carry: Carry, senses: Senses) -> tuple[Float[np.ndarray, "W n"], Carry]:
+    """As `advance`, from what was read of the view."""
     rows = carry.rows
     there, lost, wrong = _ended(body, senses, rows), _lost(senses, rows), _holds_another(senses, rows)
-    still = np.where(_hand_is_still(carry, senses, rows), carry.still + 1, 0)
-    if isinstance(body, HandedBody) and body.opening is not None:
+    still = np.zeros_like(carry.still)
+    if body.opening is not None:
+        still = np.where(_hand_is_still(carry, senses, rows), carry.still + 1, 0)
         ends = (rows["until"] == Until.TOUCHED) | ((rows["until"] == Until.THERE) & (rows["after"] == 0))
         there |= ends & (rows["moves"] > 0) & (still >= BLOCKED)
     there &= carry.steps >= np.where(rows["close"] >= 0, SETTLING, 0)
@@ -152,20 +157,18 @@ def _ended(body: Body, senses: Senses, rows: Rows) -> Bool[np.ndarray, "W"]:
     turns = (rows["base"] == Base.TURN) | (rows["base"] == Base.SHIFT)
     there = (~moves | (apart < rows["tolerance"])) & (~turns | (turned < rows["turn_tolerance"]))
     there &= np.isnan(rows["rise"]) | (np.abs(body.stands + rows["rise"] - senses.base_pos[:, 2]) < RISEN)
-    held, empty = np.zeros(len(there), bool), np.ones(len(there), bool)
     world, index = np.arange(len(there)), np.maximum(rows["object"], 0)
-    pos, quat = goals_of_hand(senses, rows)
-    for number in range(len(body.hands)):
-        mine = rows["hand"] == number
-        if not mine.any():
-            continue
-        grip = grip_of(senses, number, body.grips[number])
-        near = np.linalg.norm(pos - grip, axis=1) < rows["tolerance"]
-        angle = np.asarray(rotation_angle(senses.hand_quat[:, number], quat))
-        near = ((rows["moves"] == 0) | near) & ((rows["turns"] == 0) | (angle < rows["turn_tolerance"]))
-        there &= ~mine | near
-        held |= mine & senses.held[world, number, index]
-        empty &= ~(mine | ((rows["both"] > 0) & (rows["hand"] >= 0))) | ~senses.held[:, number].any(1)
+    held, empty = np.zeros(len(there), bool), np.ones(len(there), bool)
+    acts = np.flatnonzero(rows["hand"] >= 0)
+    if len(acts):
+        own, mine = senses.of(acts), {name: values[acts] for name, values in rows.items()}
+        pos, quat = goals_of_hand(own, mine)
+        grip, turned = acting_grip(own, mine["hand"], body.grips)
+        near = (mine["moves"] == 0) | (np.linalg.norm(pos - grip, axis=1) < mine["tolerance"])
+        there[acts] &= near & ((mine["turns"] == 0) | (rotation_angle(turned, quat) < mine["turn_tolerance"]))
+        held[acts] = own.held[np.arange(len(acts)), mine["hand"], index[acts]]
+        asked = (mine["both"] > 0)[:, None] | (mine["hand"][:, None] == np.arange(len(body.hands)))
+        empty[acts] = ~(asked & own.held.any(2)).any(1)
     touched = senses.touching[world, index]
     until = rows["until"]
     return np.select(

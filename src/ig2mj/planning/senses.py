@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 
 import jax
 import numpy as np
@@ -37,6 +38,12 @@ class Senses:
         w, x, y, z = np.moveaxis(self.base_quat, -1, 0)
         return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
+    def of(self, worlds: Int[np.ndarray, "k"]) -> Senses:
+        """The same of k worlds."""
+        joints = None if self.joints is None else self.joints[worlds]
+        base, hand = (self.base_pos[worlds], self.base_quat[worlds]), (self.hand_pos[worlds], self.hand_quat[worlds])
+        return Senses(*base, *hand, self.held[worlds], self.touching[worlds], joints)
+
 
 class FrictionHolds:
     """What hands hold by friction alone, where no constraint says so: what two links of a hand's fingers press on."""
@@ -60,10 +67,21 @@ class FrictionHolds:
 
 def sense(view: PhysicsView, agent: int, hands: Int[np.ndarray, "H"], friction: FrictionHolds | None = None) -> Senses:
     """What the view says of one robot. friction: its hands hold by friction alone; None: by constraints."""
+    return senses_of(jax.device_get(sensed(view, friction is not None)), agent, hands, friction)  # copied side by side
+
+
+def sensed(view: PhysicsView, by_friction: bool) -> tuple[Array, ...]:
+    """What `senses_of` reads of the view, of all robots; may be traced. by_friction: hands hold by friction alone."""
     a = view.agent
-    holding = view.held if friction is None else a.finger_force
-    read = a.base_pos, a.base_quat, a.hand_pos, a.hand_quat, holding, a.touching, a.joint_pos
-    base_pos, base_quat, hand_pos, hand_quat, holding, touching, joints = jax.device_get(read)  # copied side by side
+    holding = a.finger_force if by_friction else view.held
+    return a.base_pos, a.base_quat, a.hand_pos, a.hand_quat, holding, a.touching, a.joint_pos
+
+
+def senses_of(
+    arrays: Sequence[np.ndarray], agent: int, hands: Int[np.ndarray, "H"], friction: FrictionHolds | None = None
+) -> Senses:
+    """As `sense`, from the arrays of `sensed` on the host."""
+    base_pos, base_quat, hand_pos, hand_quat, holding, touching, joints = arrays
     return Senses(
         base_pos=base_pos[:, agent],
         base_quat=base_quat[:, agent],
@@ -79,3 +97,16 @@ def grip_of(senses: Senses, number: int, grip: Array) -> Float[np.ndarray, "W 3"
     """Where a hand's grasp point is, world frame, m."""
     point = np.broadcast_to(np.asarray(grip, np.float32), senses.hand_pos[:, number].shape)
     return senses.hand_pos[:, number] + np.asarray(quat_rotate(senses.hand_quat[:, number], point))
+
+
+def acting_grip(
+    senses: Senses, hand: Int[np.ndarray, "W"], grips: Float[np.ndarray, "H 3"]
+) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "W 4"]]:
+    """Where the grasp point of one hand in each world is, world frame, m, and how that hand is turned, w-x-y-z.
+
+    Args:
+      hand: number of the hand. grips: grasp points in the frames of hands, m.
+    """
+    world = np.arange(len(hand))
+    pos, quat = senses.hand_pos[world, hand], senses.hand_quat[world, hand]
+    return pos + quat_rotate(quat, grips[hand].astype(np.float32)), quat
