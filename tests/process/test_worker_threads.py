@@ -69,3 +69,13 @@ def test_a_process_that_ends_waits_only_for_what_has_begun():
     assert done.stdout.splitlines() == ["ended 0"], "what has begun ends; a hundred would take 50 s"
     assert time.monotonic() - began < 30
     assert "KeyboardInterrupt" in done.stderr
+
+
+def test_threads_of_a_block_that_was_never_left_do_not_keep_a_process():
+    code = (
+        "from ig2mj.process.worker_threads import WorkerThreads\n"
+        "crew = WorkerThreads(2, 'test')\n"
+        "print(crew.submit(lambda: 3).result())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=40)
+    assert (done.stdout, done.returncode) == ("3\n", 0)

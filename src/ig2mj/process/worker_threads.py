@@ -12,6 +12,7 @@ import concurrent.futures
 import contextlib
 import queue
 import threading
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -19,6 +20,8 @@ ENDING = threading.Event()
 """Set when the process exits."""
 
 _threads: set[threading.Thread] = set()
+
+_groups: weakref.WeakSet[WorkerThreads] = weakref.WeakSet()
 
 
 class WorkerThreads(contextlib.AbstractContextManager):
@@ -29,6 +32,7 @@ class WorkerThreads(contextlib.AbstractContextManager):
         self._jobs: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._dropped = threading.Event()
         self._members = [spawn(self._work, f"{name}-{k}") for k in range(workers)]
+        _groups.add(self)
 
     def submit(self, act: Callable[..., Any], *arguments: Any) -> concurrent.futures.Future[Any]:
         """Queues a call. Its future is cancelled if the process exits, or the block raises, before the call starts."""
@@ -54,10 +58,14 @@ class WorkerThreads(contextlib.AbstractContextManager):
     def __exit__(self, kind: Any, *about: Any) -> None:
         if kind is not None:
             self._dropped.set()
-        for _ in range(len(self._members)):
-            self._jobs.put(None)
+        self.end()
         for member in self._members:
             member.join()
+
+    def end(self) -> None:
+        """Lets the threads end when the queue is empty; does not wait for them."""
+        for _ in range(len(self._members)):
+            self._jobs.put(None)
 
 
 def spawn(act: Callable[[], None], name: str) -> threading.Thread:
@@ -77,7 +85,9 @@ def spawn(act: Callable[[], None], name: str) -> threading.Thread:
 
 @atexit.register
 def end() -> None:
-    """Sets `ENDING` and joins the threads."""
+    """Sets `ENDING` and joins the threads, also of groups whose block was never left."""
     ENDING.set()
+    for group in list(_groups):
+        group.end()
     for thread in list(_threads):
         thread.join()

@@ -24,8 +24,7 @@ class PackedRows:
 
     def __init__(self, read: Callable[..., Any]):
         self.read = read
-        self._pack = jax.jit(self._packed)
-        self._kinds: dict[Any, tuple[Any, list[jax.ShapeDtypeStruct]]] = {}
+        self._kinds: dict[Any, tuple[Any, list[jax.ShapeDtypeStruct], Callable[..., Array]]] = {}
 
     def begin(self, rows: Int[np.ndarray, "k"], *arguments: Any) -> Callable[[], Any]:
         """Begins to copy rows to the host. Returns a function that waits for them: the tree in numpy arrays [k, ...] of
@@ -33,26 +32,29 @@ class PackedRows:
         given, structure = jax.tree.flatten(arguments)
         kind = structure, tuple((a.shape, a.dtype) for a in given)
         if kind not in self._kinds:
-            self._kinds[kind] = self._kind(arguments)
-        tree, leaves = self._kinds[kind]
-        packed = self._pack(rows, *arguments)
+            self._kinds[kind] = self._kind(structure, given)
+        tree, leaves, pack = self._kinds[kind]
+        packed = pack(rows, given)
         packed.copy_to_host_async()
         return lambda: jax.tree.unflatten(tree, _unpacked(np.asarray(packed), leaves))
 
-    def _kind(self, arguments: Sequence[Any]) -> tuple[Any, list[jax.ShapeDtypeStruct]]:
-        """Structure, shapes and types of what is read."""
+    def _kind(
+        self, structure: Any, given: Sequence[Any]
+    ) -> tuple[Any, list[jax.ShapeDtypeStruct], Callable[..., Array]]:
+        """Structure, shapes and types of what is read, and what packs it: a program of the arguments' leaves, since
+        flattening them takes as long as the call."""
         structures = []
 
-        def leaves(*traced: Any) -> list[Array]:
-            found, structure = jax.tree.flatten(self.read(*traced))
-            structures.append(structure)
+        def leaves(traced: Sequence[Any]) -> list[Array]:
+            found, tree = jax.tree.flatten(self.read(*jax.tree.unflatten(structure, traced)))
+            structures.append(tree)
             return found
 
-        shapes = jax.eval_shape(leaves, *arguments)
-        return structures[0], shapes
+        def packed(rows: Int[Array, "k"], traced: Sequence[Any]) -> UInt8[Array, "k B"]:
+            return jnp.concatenate([_bytes_of(leaf[rows]) for leaf in leaves(traced)], axis=1)
 
-    def _packed(self, rows: Int[Array, "k"], *arguments: Any) -> UInt8[Array, "k B"]:
-        return jnp.concatenate([_bytes_of(leaf[rows]) for leaf in jax.tree.leaves(self.read(*arguments))], axis=1)
+        shapes = jax.eval_shape(leaves, given)
+        return structures[0], shapes, jax.jit(packed)
 
 
 def _bytes_of(array: Array) -> UInt8[Array, "k b"]:
