@@ -6,7 +6,9 @@ import pytest
 from ig2mj.planning.domain import Domain
 from ig2mj.planning.joints import OPEN_TO
 from ig2mj.planning.kinematic import kinematic_episodes
+from ig2mj.planning.phases import Phase
 from ig2mj.planning.problem import problem_of
+from ig2mj.planning.pushing import BEHIND, PRESS
 from ig2mj.planning.rung import Rung
 from ig2mj.planning.solver import solve
 from ig2mj.planning.steps import make_step
@@ -54,6 +56,22 @@ def test_an_arm_carries_its_hand_to_where_it_is_planned(tiny_home_folder):
     assert np.linalg.norm(held - robot.hands[0][0]) < 0.3
     assert do(rung, "place_on_top", "apple", "table").done
     assert rung.facts(0).holds("on_top", "apple", "table")
+
+
+@pytest.mark.slow
+def test_what_a_hand_pushes_goes_by_its_stroke_without_the_way_up_to_it(tiny_home_folder):
+    problem = problem_of(str(tiny_home_folder), "(on_top apple table)")
+    ((_, rung),) = kinematic_episodes(Domain(problem.model, 2), problem, None, [0])
+    index = rung.domain.index("can")
+    before = np.asarray(rung._symbolic.show(0).view.object_pos)[0, index].copy()
+    stroke, here = BEHIND + 0.1 + PRESS, [float(v) for v in before]
+    program = [
+        Phase(hand=0, pos=(here[0], here[1] - BEHIND, here[2])),
+        Phase(hand=0, pos=(here[0], here[1] - BEHIND + stroke, here[2]), object=index),
+    ]
+    assert rung._follow(0, program, make_step("navigate_to", ("can",))) == ""
+    after = np.asarray(rung._symbolic.show(0).view.object_pos)[0, index]
+    np.testing.assert_allclose(after - before, [0.0, 0.1, 0.0], atol=0.01)
 
 
 def test_failures_have_the_reasons_of_physics(rung):

@@ -31,6 +31,7 @@ from ig2mj.planning.opened_wide import opened_wide
 from ig2mj.planning.phases import Base, Phase, Until
 from ig2mj.planning.primitives import primitive
 from ig2mj.planning.problem import Problem, start_of
+from ig2mj.planning.pushing import BEHIND, PRESS, borne_by
 from ig2mj.planning.senses import Senses
 from ig2mj.planning.starts import open_doors, scene_with_robot
 from ig2mj.planning.steps import Outcome, PlanningError, Step
@@ -170,9 +171,7 @@ class KinematicRung:
         if lacking := self._symbolic.lacking(world, step):
             return Outcome("no_grasp", lacking)
         self._show(world)
-        rng = np.random.default_rng([self._seed, self._first + world, self._count[world]])
-        planned = _KinematicWorld(self._stage, self.body, self.domain, self._planner, self._query, 0, rng)
-        planned.robot = self._robots[world]
+        planned = self._planned(world)
         running, reason = primitive(planned, step), None
         outcome = Outcome("timeout", f"{MOST_PROGRAMS} motions were not enough")
         for _ in range(MOST_PROGRAMS):
@@ -184,6 +183,13 @@ class KinematicRung:
             reason = self._follow(world, program, step)
         running.close()
         return dataclasses.replace(outcome, planning=time.process_time() - began)
+
+    def _planned(self, world: int) -> _KinematicWorld:
+        """A world as primitives see it."""
+        rng = np.random.default_rng([self._seed, self._first + world, self._count[world]])
+        planned = _KinematicWorld(self._stage, self.body, self.domain, self._planner, self._query, 0, rng)
+        planned.robot = self._robots[world]
+        return planned
 
     def _show(self, world: int) -> None:
         """Puts the household and the robot where they are in a world."""
@@ -248,6 +254,8 @@ class KinematicRung:
                 robot.hands[hand] = grip - quat_rotate(quat, self.body.grips[hand]), quat
         if phase.until == Until.HELD:
             return self._take(world, hand, phase.object, step)
+        if phase.until == Until.THERE and phase.object >= 0:
+            self._push(world, phase.object, robot.hands[hand][0] - before)
         for other in range(len(robot.hands)) if phase.both else (hand,):
             if other != hand:
                 pos, quat = robot.hands[other]
@@ -289,6 +297,20 @@ class KinematicRung:
         if robot.held.count(name) == 1:
             self._symbolic.hold(world, name)
         return ""
+
+    def _push(self, world: int, index: int, stroke: Float[np.ndarray, "3"]) -> None:
+        """Moves an object, and what it bears, by the part of a hand's stroke (m, world frame) that it is to go.
+        Everything comes to rest."""
+        query, planned = self._symbolic.show(world), self._planned(world)
+        length = float(np.linalg.norm(stroke))
+        way = max(length - BEHIND - PRESS, 0.0) / max(length, 1e-9) * stroke * (1.0, 1.0, 0.0)
+        name = self.domain.model.tables.object_names[index]
+        for other in (name, *borne_by(planned, name)):
+            k = self._bare.index(other)
+            pos, quat = (np.asarray(a)[0, k].astype(float) for a in (query.view.object_pos, query.view.object_quat))
+            query.place(k, pos + way, quat)
+        query.settle(SETTLE)
+        self._symbolic.put(world, query.save())
 
     def _open_wide(self, world: int, name: str, hand: Float[np.ndarray, "3"] | None = None) -> None:
         """Opens what a hand is at (None: what has been opened) as wide as a hand does, if it stays so."""

@@ -56,7 +56,8 @@ class Phase:
         frame. quat: orientation of the hand, w-x-y-z; None: any. in_body: both are in the frame of the robot's base.
       reset: the hand goes back to where it rests. close: True: the hand closes, False: it opens, None: as it is.
       closes: share of its way by which a floating hand closes in an agent step.
-      until: what ends the phase. object: number of the object that this is about.
+      until: what ends the phase. object: number of the object that this is about,
+        or of what the hand pushes on its way there.
       keeps: number of an object that must stay in the hand, else the phase fails as "slipped"; -1: none.
       tolerance, turn_tolerance: m and rad within which base and hand are there.
       limit: agent steps. after: reason of the failure where the limit passes first; "": the next phase begins.

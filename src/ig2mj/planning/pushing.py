@@ -123,7 +123,7 @@ def _ways_aside(
     """Directions, with how far, m, in which an object has room to be pushed to where it bars no way, the nearest
     first."""
     world.query.load(world.stage.snapshot(world.world))
-    borne = _borne(world, name)
+    borne = borne_by(world, name)
     index, (pos, quat), obstacles = world.index(name), world.pose(name), world.obstacles([name, *borne])
     ignored = [*ignored, *(world.index(n) for n in borne)]
     points = world.points(name) - pos
@@ -142,7 +142,7 @@ def _ways_aside(
     return sorted(found, key=lambda pair: pair[1])
 
 
-def _borne(world: PlannedWorld, name: str) -> list[str]:
+def borne_by(world: PlannedWorld, name: str) -> list[str]:
     """Loose things that are on or in an object, and move with it."""
     corners = world.vertices(name)
     low, high, found = corners.min(0), corners.max(0), list[str]()
@@ -169,7 +169,7 @@ def _push_once(
     stance, point, way, gap = found
     if reason := (yield from go(world, stance)):
         return reason, 0.0
-    program = yield from from_home(world, hand, functools.partial(_program, world, gap, hand, point, way, failed))
+    program = yield from from_home(world, hand, functools.partial(_program, world, name, gap, hand, point, way, failed))
     if not program:
         return "no_path", 0.0
     reason = yield program
@@ -242,7 +242,7 @@ def _fingers(world: PlannedWorld, way: Vector) -> Vector:
     return UP if world.body.opening is None else np.cross(UP, way)
 
 
-def _program(world: PlannedWorld, gap: float, hand: int, point: Vector, way: Vector, failed: int) -> Program:
+def _program(world: PlannedWorld, name: str, gap: float, hand: int, point: Vector, way: Vector, failed: int) -> Program:
     """Goes behind the face, pushes up to a stroke, and goes back. `gap`: m that the object is to go. `failed`: pushes
     that moved nothing: boxes may touch where the objects do not, so the hand goes farther."""
     fingers = _fingers(world, way)
@@ -253,10 +253,20 @@ def _program(world: PlannedWorld, gap: float, hand: int, point: Vector, way: Vec
     found = hand_path(obstacles, spheres, world.grip(hand), start, entries, search=True, follows=follows)
     if found is None:
         return []
-    end = point + (min(gap, STROKE) + (1 + failed) * PRESS) * way
+    end, pushed = point + (min(gap, STROKE) + (1 + failed) * PRESS) * way, world.index(name)
     return [
         *travel(hand, found, quat),
-        Phase(hand=hand, pos=vector3(end), quat=quat, close=False, tolerance=0.02, limit=40, after="", speed=SLOW),
+        Phase(
+            hand=hand,
+            pos=vector3(end),
+            quat=quat,
+            close=False,
+            object=pushed,
+            tolerance=0.02,
+            limit=40,
+            after="",
+            speed=SLOW,
+        ),
         Phase(hand=hand, pos=vector3(start), tolerance=0.04, limit=20, after=""),
         *travel(hand, found[-2::-1], None),
         *rest(hand),
