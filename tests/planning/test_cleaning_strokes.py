@@ -6,11 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ig2mj.planning.cleaning import _press
 from ig2mj.planning.cleaning_strokes import Stroke, one_after_another, spread
-from ig2mj.planning.held_tools import FIRST, PRESSED, SHIFTED_TURNS, HeldTool, Region, regions_of, turn_about
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.held_tools import ALIKE, FIRST, PRESSED, SHIFTED_TURNS, HeldTool, Region, regions_of, turn_about
+from ig2mj.planning.moves import way_back
 from ig2mj.planning.stances import SPREAD
 from ig2mj.planning.tool_areas import is_hidden
-from ig2mj.planning.world import DirtSpot
+from ig2mj.planning.world import DirtSpot, PlannedWorld
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -57,6 +60,62 @@ def test_a_gripper_turns_its_tool_about_the_face_until_it_points_away_from_the_r
     assert first @ out == pytest.approx([0.0, 0.0, -1.0], abs=1e-6)
     assert first @ ahead == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
     assert all((r.rotation @ ahead)[0] > -0.5 for r in regions)
+
+
+@pytest.mark.parametrize("normal", [UP, np.array([0.0, 1.0, 0.0])])
+def test_a_gripper_tilts_its_tool_where_it_does_not_reach_otherwise(normal):
+    palm = np.array([0.6, 0.0, -0.8])
+    held = HeldTool.__new__(HeldTool)
+    held.hand, held.has_area, held.out, held.corners, held.whole = 0, True, -UP, SPONGE, SPONGE
+    axes = lambda hand: (np.array([0.0, 1.0, 0.0]), palm)  # noqa: E731
+    held.world = SimpleNamespace(body=SimpleNamespace(opening=0.1), base=(np.zeros(2), 0.0), hand_axes=axes)
+    regions = [r for r in regions_of(held, 0.0, normal) if not r.shift.any()]
+    tilted = [float((r.rotation @ held.out) @ -normal) < 0.999 for r in regions]
+    assert any(tilted) and sorted(tilted) == tilted, "those first in which it lies on the face"
+    points = [r.rotation @ palm for r in regions]
+    first = tilted.index(True)
+    assert all(a @ b < ALIKE for k, a in enumerate(points[first:], first) for b in points[:k])
+
+
+def test_an_arm_brings_a_tool_to_a_face_before_it_presses():
+    """It moves by few mm in its first steps, so that pressing would be over before."""
+    region, spot = Region.turned(np.eye(3), SPONGE), DirtSpot(0, np.zeros(3), UP)
+    world = SimpleNamespace(index=lambda name: 3, turned_hand=lambda *_: (1.0, 0.0, 0.0, 0.0))
+    heights = {}
+    for opening in (None, 0.1):
+        world.body = SimpleNamespace(opening=opening)
+        program = _press(world, "sponge", 0, region, spot, [region.above(spot)])
+        assert all(phase.keeps == 3 for phase in program)
+        heights[opening] = [round(phase.pos[2] - region.at(spot)[2], 3) for phase in program]
+    assert heights == {None: [0.06, 0.0, 0.06], 0.1: [0.06, 0.03, 0.0, 0.06]}
+
+
+class Board(Obstacles):
+    """A board at a height of 0.5 m from x = 0 on."""
+
+    def clear_along(self, spheres, start, ahead, along):
+        points = start + ahead * along[:, None]
+        return not ((points[:, 0] > 0.0) & (np.abs(points[:, 2] - 0.5) < 0.05)).any()
+
+
+class BelowBoard(PlannedWorld):
+    """Where a hand is, and where it carries a rag."""
+
+    at, home = np.array([0.5, 0.0, 0.3]), np.array([-0.5, 0.0, 1.0])
+    stance = None
+    obstacles = lambda self, *_: object.__new__(Board)  # noqa: E731
+    carried = lambda self, *_: self.home  # noqa: E731
+    grip = lambda self, hand: self.at  # noqa: E731
+    hand_axes = lambda self, hand: (UP, UP)  # noqa: E731
+    spheres = lambda self, *_, **__: np.zeros((1, 4))  # noqa: E731
+
+
+def test_an_arm_comes_from_below_a_board_the_way_that_it_came():
+    world, before = object.__new__(BelowBoard), np.array([-0.3, 0.0, 0.3])
+    came = [world.home, before, world.at]
+    assert way_back(world, 0, "rag", came) == [before], "from there the straight way is free"
+    world.at = np.array([-0.1, 0.0, 0.7])
+    assert way_back(world, 0, "rag", came) == [], "and from here it is"
 
 
 def held_rag(rim=0.004):
@@ -137,3 +196,11 @@ def test_a_cleaning_area_inside_of_its_tool_is_hidden(tiny_home):
 
     assert hidden(0.5) and not hidden(1.0)
     assert not is_hidden(tables, -1)
+
+
+def test_an_arm_presses_a_rag_flat_before_it_tilts_it_onto_its_rim():
+    held = held_rag(0.0015)
+    held.world.body = SimpleNamespace(opening=0.1)
+    held.world.hand_axes = lambda hand: (np.array([0.0, 1.0, 0.0]), np.array([0.6, 0.0, -0.8]))
+    flat = [bool(r.rotation[2, 2] > 0.999) for r in regions_of(held, 0.0, UP)]
+    assert not all(flat) and sorted(flat, reverse=True) == flat, "also with the particle near its rim"

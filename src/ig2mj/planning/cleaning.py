@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Sequence
 import numpy as np
 
 from ig2mj.planning.cleaning_area import is_behind, is_covered
-from ig2mj.planning.cleaning_strokes import FEW, Stroke, plan_strokes
+from ig2mj.planning.cleaning_strokes import FEW, Stroke, plan_strokes, strokes_here
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp, held_again, put_down_others, with_free_hand
 from ig2mj.planning.handing_over import hand_over_in_the_open
@@ -40,8 +40,13 @@ from ig2mj.planning.world import DirtSpot, PlannedWorld, Stance, Vector
 ROUNDS = 24
 """Stances from which an object is cleaned, at most."""
 
-PRESSES = 4
-"""Agent steps that a tool is pressed: with each the hand is pulled farther into the face."""
+PRESSES, ARM_PRESSES = 4, 6
+"""Agent steps that a tool is pressed: with each the hand is pulled farther into the face; the same of a hand on an arm,
+which is slower."""
+
+BEFORE, COMES = 0.03, 12
+"""m before where a tool is pressed to which an arm brings it first, and agent steps for that at most: it moves by 5 to
+10 mm in a step at the beginning, and would end before the face."""
 
 TRIES = 4
 """Times that a particle is gone for."""
@@ -118,6 +123,7 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 break
             if strayed(world, hand):
                 yield from go_home_past(world, hand, came)
+                came = []
                 if tool not in world.held:
                     continue
             visited.append(plan.stance)
@@ -125,6 +131,8 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 reason, detail = failed, f"no path leads to where the dirt of {name} is in reach"
                 tried.update(spot.number for spot in plan.covered)
                 continue
+            if not floats and tool in world.held:  # a base on wheels stops some cm off, where arms have other ways
+                plan = strokes_here(world, name, tool, hand, spots) or plan
             for stroke in plan.strokes:
                 tried[stroke.spot.number] += 1
                 if not world.facts.holds(predicate, name) or tool not in world.held:
@@ -136,9 +144,12 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 program = _program(world, tool, hand, present)
                 if not program and strayed(world, hand):
                     yield from go_home_past(world, hand, came)
+                    came = []
                     program = _program(world, tool, hand, present) if tool in world.held else []
                 if program:
-                    came = [world.grip(hand), *(np.array(p.pos) for p in program[:-2] if p.pos is not None)]
+                    begins = [world.grip(hand)] if floats or not came else came
+                    last = -2 if floats else -3
+                    came = [*begins, *(np.array(p.pos) for p in program[:last] if p.pos is not None)]
                     reason, detail = (yield program), f"{tool} did not take enough off {name}"
         if tool in world.held:
             yield from go_home_past(world, hand_with(world, tool), came)
@@ -225,7 +236,7 @@ def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Progr
             follows = world.follows(hand, world.turned_hand(hand, region.rotation), obstacles)
             back, goal = [UP, -ahead(stance.yaw), spot.normal], region.above(spot)
             way = hand_path(obstacles, spheres, world.grip(hand), goal, back, follows=follows, strays=strays)
-            if way is not None:
+            if way is not None and (follows is None or follows.passes([*way, region.at(spot)])):
                 return _press(world, tool, hand, region, spot, way)
             ways += 1
             if ways == FEW:
@@ -234,12 +245,15 @@ def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Progr
 
 
 def _press(world: PlannedWorld, tool: str, hand: int, region: Region, spot: DirtSpot, way: Sequence[Vector]) -> Program:
-    keeps = world.index(tool)
+    keeps, arm = world.index(tool), world.body.opening is not None
     quat, target = world.turned_hand(hand, region.rotation), region.at(spot)
+    press = Phase(
+        hand=hand, pos=vector3(target), quat=quat, keeps=keeps, tolerance=0.004, limit=PRESSES, after="", speed=0.03
+    )
+    before = vector3(target + BEFORE * spot.normal)
+    comes = dataclasses.replace(press, pos=before, tolerance=0.01, limit=COMES)
     return [
         *travel(hand, way, quat, keeps=keeps),
-        Phase(
-            hand=hand, pos=vector3(target), quat=quat, keeps=keeps, tolerance=0.004, limit=PRESSES, after="", speed=0.03
-        ),
+        *([comes, dataclasses.replace(press, limit=ARM_PRESSES)] if arm else [press]),
         Phase(hand=hand, pos=vector3(way[-1]), keeps=keeps, tolerance=0.03, limit=12, after=""),
     ]

@@ -108,7 +108,7 @@ def plan_strokes(
     held, loose = HeldTool(world, tool, hand, LITTLE if around else 1.0), not world.domain.fixed(name)
     best: StrokePlan | None = None
     seen = [*visited]
-    looked, enough = 0, min(ENOUGH, len(spots))
+    looked, enough, floats = 0, min(ENOUGH, len(spots)), world.body.opening is None
     aims, most, apart = (spread(spots), ALL_AROUND, SPREAD) if around else (spots, STANCES, ELSEWHERE)
     for aim in aims:
         known = len(seen)
@@ -124,9 +124,16 @@ def plan_strokes(
             if best is not None and best.worth >= enough:
                 return best
         looked += len(seen) > known
-        if looked == NEAREST and not around:
+        if looked >= NEAREST and not around and (floats or best is not None):
             break
     return best
+
+
+def strokes_here(world: PlannedWorld, name: str, tool: str, hand: int, spots: Sequence[DirtSpot]) -> StrokePlan | None:
+    """Strokes from where the robot stands, with its hand where it carries the tool; None: there are none."""
+    obstacles, loose = world.obstacles([tool], stays=False), not world.domain.fixed(name)
+    spots = [s for s in spots if s.normal[2] > LOWEST]
+    return _From(HeldTool(world, tool, hand), world.stance, obstacles, loose).plan(spots)
 
 
 def spread(spots: Sequence[DirtSpot]) -> list[DirtSpot]:
@@ -145,6 +152,7 @@ class _From:
         """`obstacles`: all but the tool. loose: what is cleaned can move."""
         self._loose = loose
         self._held, self._world, self._hand, self._stance = held, held.world, held.hand, stance
+        self._floats = held.world.body.opening is None
         self._obstacles = held.world.standing(obstacles, stance, held.hand)
         self._start = held.world.carried(held.hand, stance)
         self._known: dict[tuple[float, ...], list[tuple[Region, np.ndarray]]] = {}
@@ -177,6 +185,8 @@ class _From:
             taken |= own
             left &= ~covers[best][near]
         strokes = one_after_another(strokes)
+        if not self._floats:
+            strokes = [stroke for stroke in strokes if self.way(stroke.spot, stroke.turn)]
         if not any(self.way(stroke.spot, stroke.turn) for stroke in strokes[:FEW]):
             return None
         return StrokePlan(self._stance, strokes)
@@ -208,7 +218,7 @@ class _From:
             to_robot = (normal[:, 2] > 0.5) | (((here - pos[:, :2]) * normal[:, :2]).sum(1) > 0)
             left = to_robot | (pos[:, 2] < OVER_TOP)
             for turn, (region, spheres) in enumerate(self._turned(normal[0])):
-                if turn > OVERS:  # over the rim of a bathtub to its near inner side
+                if turn > OVERS and self._floats:  # over the rim of a bathtub to its near inner side
                     left &= to_robot
                 if not left.any():
                     break
@@ -216,7 +226,7 @@ class _From:
                 room = left & (np.linalg.norm(at - shoulder, axis=1) <= self._world.body.reach)
                 rows = np.flatnonzero(room)
                 room[rows] = self._obstacles.clear_at(spheres, at[rows] + region.lifted * normal[rows])
-                if self._world.body.opening is not None and room.any():
+                if not self._floats and room.any():
                     room = self._reached(spots, members, room, turn, np.linalg.norm(at - shoulder, axis=1))
                 for row in np.flatnonzero(room & ~to_robot):
                     room[row] = bool(self.way(spots[members[row]], turn))
@@ -254,7 +264,8 @@ class _From:
         follows = world.follows(hand, world.turned_hand(hand, region.rotation), self._obstacles, self._stance)
         back = [UP, -ahead(self._stance.yaw), spot.normal]
         goal = region.above(spot)
-        return hand_path(self._obstacles, spheres, self._start, goal, back, follows=follows, strays=True)
+        way = hand_path(self._obstacles, spheres, self._start, goal, back, follows=follows, strays=True)
+        return None if way is None or (follows and not follows.passes([*way, region.at(spot)])) else way
 
 
 def one_after_another(strokes: list[Stroke]) -> list[Stroke]:

@@ -28,6 +28,10 @@ TURNS = (np.pi / 2, -np.pi / 2, np.pi)
 FIRST = 0.002
 """m by which the rest of a tool may come to a face before the part that cleans: farther away that touches nothing."""
 
+RIM = 0.0003
+"""m by which the rest of a tool may come to a face before the part that cleans, where an arm presses it: in turns with
+more, as of a rag that is tilted onto its rim, it cleans in few strokes, and these come last."""
+
 SHIFTED, SHIFTED_TURNS = 0.4, 2
 """Share of a tool's box, along the face, by which its middle is off a particle that has no room around it; and turns in
 which it is shifted."""
@@ -42,6 +46,10 @@ normal in which a gripper does so, of those that are tried."""
 
 TILTS = (-0.8, 0.8)
 """rad about an axis in a face by which a tool is tilted."""
+
+ARM_TILTS, ALIKE = 12, 0.95
+"""Tilted turns of a tool on an arm that are tried at most after those that are not, and cosine of the angle between
+where the gripper points in two of them, above which an arm reaches both or none: its last joint turns about that."""
 
 EAST = np.array([1.0, 0.0, 0.0])
 
@@ -146,7 +154,8 @@ def regions_of(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
     """Turns of a tool with its box, for a robot that looks along `yaw`, rad: with its cleaning area towards the face;
     as it is carried; of a hand that floats, turned about the normal and tilted, too, and close to the face, where there
     is less room. A tilted tool cleans in a larger box. Only those count in which the part that cleans comes to the face
-    first: the others touch nothing with it. Then come the first of them with the particle near the rim of the box.
+    first: the others touch nothing with it. Then come the first of them with the particle near the rim of the box. An
+    arm tilts a tool, too, in turns in which that part comes to the face first but for `RIM`, and in others at last.
     """
     found = _turned_regions(held, yaw, normal)
     late = [float((held.whole @ (r.rotation.T @ normal)).min() - (r.corners @ normal).min()) for r in found]
@@ -154,7 +163,10 @@ def regions_of(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
     first = [r for r, by in zip(found, late, strict=True) if by >= enough]
     near = [r for r in first if r.lifted == first[0].lifted]
     off = [shifted for r in near[:SHIFTED_TURNS] for shifted in r.shifted(normal)]
-    return [*first, *off]
+    if held.world.body.opening is None:
+        return [*first, *off]
+    late_ones = [r for r, by in zip(found, late, strict=True) if enough <= by < -RIM]
+    return [*(r for r in first if r not in late_ones), *off, *late_ones]
 
 
 def _turned_regions(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
@@ -187,7 +199,15 @@ def _of_arm(held: HeldTool, yaw: float, normal: Vector, facing: Rotation, carrie
 
     flat = [] if held.flat is None else turned([turn_onto(carried @ held.flat, -normal) @ carried])[:FLAT_TURNS]
     bases = [facing] if held.has_area else [facing, turn_onto(carried @ palm, -normal) @ carried]
-    return [*flat, *turned(bases)][:ARM_TURNS] or [facing]
+    found = [*flat, *turned(bases)][:ARM_TURNS] or [facing]
+    for share in (0.5, 1.0):
+        tilts = [turn_about(axis, share * angle) for axis in axes_along(normal, aside(yaw)) for angle in TILTS]
+        leaning = sorted((tilt @ r for tilt in tilts for r in turned(bases)), key=lambda r: -float(r @ palm @ aim))
+        for rotation in leaning:
+            points = rotation @ palm
+            if points @ aim > BACKWARDS and all(points @ other @ palm < ALIKE for other in found):
+                found.append(rotation)
+    return found[: ARM_TURNS + ARM_TILTS]
 
 
 def aside(yaw: float) -> Vector:

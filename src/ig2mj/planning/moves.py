@@ -262,10 +262,28 @@ def go_home(world: PlannedWorld, hand: int) -> Program:
 
 
 def go_home_past(world: PlannedWorld, hand: int, came: Sequence[Vector]) -> Generator[Program, str, None]:
-    """As `go_home`; where no way home is free, the hand first goes back the way that it came to where it is."""
-    if came and world.body.opening is None and way_home(world, hand, world.held[hand]) is None:
+    """As `go_home`; where no way home is free, the hand first goes back the way that it came to where it is: one on an
+    arm up to where the straight way home is free."""
+    name = world.held[hand]
+    if came and world.body.opening is None and way_home(world, hand, name) is None:
         yield travel(hand, came[-2::-1], None)
+    if came and world.body.opening is not None and name:
+        yield [*travel(hand, way_back(world, hand, name, came), None, world.index(name)), carry(world, hand)]
+        return
     yield go_home(world, hand)
+
+
+def way_back(world: PlannedWorld, hand: int, name: str, came: Sequence[Vector]) -> list[Vector]:
+    """Points of the way that a hand came (m, the last is where it is about), backwards, up to the first one from which
+    the straight way to where it carries an object is free."""
+    obstacles, home = world.obstacles([name], world.stance), world.carried(hand, world.stance)
+    spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)
+    found = list[Vector]()
+    for point in [world.grip(hand), *came[-2::-1]]:
+        found.append(point)
+        if straight(obstacles, spheres, point, home):
+            break
+    return found[1:]
 
 
 def way_home(world: PlannedWorld, hand: int, name: str, moved: Vector | None = None) -> list[Vector] | None:
