@@ -185,11 +185,11 @@ class _From:
             taken |= own
             left &= ~covers[best][near]
         strokes = one_after_another(strokes)
-        if not self._floats:
+        if not self._floats:  # from one stance, an arm has no way to many of them
             strokes = [stroke for stroke in strokes if self.way(stroke.spot, stroke.turn)]
-        if not any(self.way(stroke.spot, stroke.turn) for stroke in strokes[:FEW]):
+        elif not any(self.way(stroke.spot, stroke.turn) for stroke in strokes[:FEW]):
             return None
-        return StrokePlan(self._stance, strokes)
+        return StrokePlan(self._stance, strokes) if strokes else None
 
     def _roofed(self, spots: Sequence[DirtSpot]) -> Bool[np.ndarray, "n"]:
         """Before which particles something is in the way of a tool that comes straight to the face."""
