@@ -280,6 +280,7 @@ def test_what_is_lost_while_its_container_is_opened_is_taken_again(monkeypatch, 
 
     world = object.__new__(World)
     world.domain = types.SimpleNamespace(hands_for=lambda name: 1, loose=())  # pyright: ignore
+    world.body = types.SimpleNamespace(opening=None)  # pyright: ignore
     changes = {
         "is_thrown_over": lambda *_: False, "steadied": lambda world, name, hand, action: action,
         "_find": find, "grasp": grasp, "go": nothing, "set_upright": nothing, "from_home": lambda *_: nothing(),

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ig2mj.planning import driving, placing
+from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.phases import Base
 from ig2mj.planning.placing import AROUND, STANCES, Spot
 from ig2mj.planning.world import PlannedWorld, Stance
@@ -25,7 +26,7 @@ class _World(PlannedWorld):
         self.missed = Counter[str]()
 
     def obstacles(self, without=(), at=None, stays=True):
-        return None  # pyright: ignore[reportReturnType]
+        return Obstacles.__new__(Obstacles)
 
     def floor(self, *args, **kwargs):
         return None  # pyright: ignore[reportReturnType]

@@ -41,6 +41,7 @@ from ig2mj.planning.moves import (
 )
 from ig2mj.planning.opening import withdraw
 from ig2mj.planning.opening_around import Tried, is_shut, open_into
+from ig2mj.planning.over_mouths import is_deep, over_mouth
 from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.spots import Spot, ends_down, grip_for, is_tipped, put_there, spots_for, spots_upon
 from ig2mj.planning.stances import stances
@@ -103,6 +104,15 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
             if predicate == "inside" and is_thrown_over(world, where):
                 yield from put_down_others(world, name)
                 if (yield from set_upright(world, where)) and name not in world.held:
+                    continue
+            if (
+                not righted
+                and world.body.opening is not None
+                and is_graspable(world, where)
+                and is_tipped(world, where)
+            ):
+                righted = True
+                if not (yield from with_free_hand(world, set_upright(world, where))) and name not in world.held:
                     continue
             hand = hand_with(world, name)
             found, also = yield from _find(world, predicate, step, hand, opened, until)
@@ -268,12 +278,18 @@ def _find(
     in the way of a container is opened before ways are searched for, and at last the object is let go as it hangs. Of
     what is only to touch something, `until` is that, places where it does not lie level are taken, too."""
     name, where = step.arguments
+    mouth = predicate == "inside" and world.body.opening is not None
+    first = mouth and not step.also and is_deep(world, where)
     while True:
+        if first and (over := _plan_over_mouth(world, name, hand, where)) is not None:
+            return over, ()
         for also in dict.fromkeys((step.also, ())):
             spots = _Remembered(spots_for(world, predicate, name, where, also, flat=step.flat))
             found = _plan(world, predicate, name, hand, spots)
             if not isinstance(found, str):
                 return found, also
+        if mouth and not first and (over := _plan_over_mouth(world, name, hand, where)) is not None:
+            return over, ()
         if predicate != "inside" or not (yield from _opened(world, where, opened)) or name not in world.held:
             break
     if isinstance(found, str) and until == "in_contact_with":
@@ -448,15 +464,34 @@ def _plan(
                 if count == STANCES:
                     break
 
-    def has_way(candidate: tuple[Stance, Spot], search: bool) -> bool:
-        stance, spot = candidate
-        target, quat, _ = grip_for(world, hand, name, spot)
-        spheres = _spheres(world, name, hand, spot)
-        back, standing = [UP, -ahead(stance.yaw)], world.standing(obstacles, stance, hand)
-        start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
-        follows = world.follows(hand, quat, standing, stance)
-        goal = target + (LET_GO + spot.drop) * UP
-        return hand_path(standing, spheres, start, goal, back, SPARE, search, follows, turns=True) is not None
+    has_way = functools.partial(_has_way, world, name, hand, obstacles)
+    return first_way(candidates(), has_way, _ways(world, predicate, name), search) or lacking
 
-    ways = WAYS if floats else max(FEWEST_WAYS, ARM_WAYS // (1 + world.missed[f"{predicate} {name}"]))
-    return first_way(candidates(), has_way, ways, search) or lacking
+
+def _plan_over_mouth(world: PlannedWorld, name: str, hand: int, where: str) -> tuple[Stance, Spot] | None:
+    """As `_plan`, of a gripper that lets go over the mouth of a container; None: there is no such way."""
+    obstacles = world.obstacles([name], stays=False)
+    proposed = over_mouth(world, name, hand, where, obstacles, world.floor())
+    has_way = functools.partial(_has_way, world, name, hand, obstacles)
+    return first_way(proposed, has_way, _ways(world, "inside", name), search=False)
+
+
+def _ways(world: PlannedWorld, predicate: str, name: str) -> int:
+    """Ways of a hand that are looked for, at most."""
+    if world.body.opening is None:
+        return WAYS
+    return max(FEWEST_WAYS, ARM_WAYS // (1 + world.missed[f"{predicate} {name}"]))
+
+
+def _has_way(
+    world: PlannedWorld, name: str, hand: int, obstacles: Obstacles, candidate: tuple[Stance, Spot], search: bool
+) -> bool:
+    """Whether the hand has a way to a spot from a stance."""
+    stance, spot = candidate
+    target, quat, _ = grip_for(world, hand, name, spot)
+    spheres = _spheres(world, name, hand, spot)
+    back, standing = [UP, -ahead(stance.yaw)], world.standing(obstacles, stance, hand)
+    start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
+    follows = world.follows(hand, quat, standing, stance)
+    goal = target + (LET_GO + spot.drop) * UP
+    return hand_path(standing, spheres, start, goal, back, SPARE, search, follows, turns=True) is not None

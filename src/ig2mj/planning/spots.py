@@ -323,14 +323,19 @@ def _cramped(world: PlannedWorld, positions: Float[np.ndarray, "n 3"]) -> Float[
     return np.clip(OPEN - floor.spare[tuple(np.moveaxis(cells, -1, 0))], 0.0, 2 * OPEN)
 
 
-def _middle_of_fixed_part(world: PlannedWorld, name: str) -> Vector:
-    """Of an object without its doors, drawers and lids: middle of its box, m."""
+def fixed_part(world: PlannedWorld, name: str) -> Float[np.ndarray, "V 3"]:
+    """Corners of an object without its doors, drawers and lids, m."""
     tables, model = world.domain.model.tables, world.stage.scene.model
     index = world.index(name)
     joints = np.isin(model.jnt_qposadr, tables.openable_qposadr[tables.openable_object == index])
     own = tables.piece_object == index
     fixed = np.flatnonzero(own & ~np.isin(tables.piece_body, model.jnt_bodyid[joints]))
-    corners = world.vertices_of_pieces(fixed if len(fixed) else np.flatnonzero(own))
+    return world.vertices_of_pieces(fixed if len(fixed) else np.flatnonzero(own))
+
+
+def _middle_of_fixed_part(world: PlannedWorld, name: str) -> Vector:
+    """Middle of the box about `fixed_part`, m."""
+    corners = fixed_part(world, name)
     return (corners.min(0) + corners.max(0)) / 2
 
 
