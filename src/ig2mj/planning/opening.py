@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping
 import numpy as np
 
 from ig2mj.geometry.host_rotations import turn_onto
-from ig2mj.planning.clearance import Obstacles, hand_way
+from ig2mj.planning.clearance import Obstacles, hand_way, straight
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasps import AT_OBJECT
 from ig2mj.planning.joints import AJAR, OPEN_TO, FaceGrip, OpenableJoint, openable_joints
@@ -182,20 +182,32 @@ def _moved(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointPla
 def withdraw(world: PlannedWorld, hand: int) -> Program:
     """The empty hand goes back to where it rests, around what it has moved: else it lifts a light box by its open lid.
 
-    Where the hand touches the link, it first goes straight off it. It keeps clear of all by its spheres where it can: a
-    leaf that is brushed swings on.
+    Where the hand touches the link, it first goes straight off it.
+    """
+    return way_off(world, hand) or rest(hand)
+
+
+def way_off(world: PlannedWorld, hand: int, among_walls: bool = False) -> Program:
+    """How the empty hand goes straight off what it touches, and then to where it rests; empty where it has no way. It
+    keeps clear of all by its spheres where it can: a leaf that is brushed swings on.
+
+    Args:
+      among_walls: what does not touch the hand bars it on the way off, too, such as the wall of a bag that it is in.
     """
     fingers, palm = world.hand_axes(hand)
     spheres, obstacles = world.spheres(fingers, palm), world.obstacles()
     start, end = world.grip(hand), world.resting(hand, world.stance)
     for share in (1.0, AT_OBJECT):
         there = spheres * (1.0, 1.0, 1.0, share)
+        apart_now = there[obstacles.distance(there[:, :3] + start) > there[:, 3]]
         for off in (-palm, -ahead(world.stance.yaw), UP, -fingers):
             for apart in OFF:
+                if among_walls and not straight(obstacles, apart_now, start, start + apart * off):
+                    break
                 way = hand_way(obstacles, there, start + apart * off, end)
                 if way is not None:
                     return [*travel(hand, [start + apart * off, *way], None), *rest(hand)]
-    return rest(hand)
+    return []
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ from ig2mj.planning.moves import (
     turning_point,
     vector3,
 )
-from ig2mj.planning.opening import withdraw
+from ig2mj.planning.opening import way_off
 from ig2mj.planning.opening_around import Tried, is_shut, open_into
 from ig2mj.planning.over_mouths import is_deep, over_mouth
 from ig2mj.planning.phases import Phase, Until
@@ -211,8 +211,8 @@ def letting_go(
         return reason
     returns = [*way[-2::-1], start]
     if world.body.opening is None and _is_caught(world, name, hand, returns):
-        off = withdraw(world, hand)
-        if off != rest(hand):
+        off = way_off(world, hand, among_walls=True)
+        if off:
             return (yield [*off, waits])
     return (yield [*travel(hand, returns, None), *rest(hand), waits])
 
