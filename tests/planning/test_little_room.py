@@ -309,6 +309,39 @@ def test_what_a_hand_has_let_go_bars_its_way_back_where_it_stands_there(world):
     assert not placing._is_caught(at, "ball", 1, [across, up])
 
 
+class _BetweenWalls(Obstacles):
+    """Two slabs, of which a hand at a point touches one, 0.3 m high above it; the other is behind the hand."""
+
+    behind = 0.12, 0.14
+    """m from the point."""
+
+    def __init__(self, point):
+        self._point = point
+
+    def distance(self, points):
+        along, _, up = np.moveaxis(points - self._point, -1, 0)
+        slabs = ((-0.06, 0.0), self.behind)
+        aside = np.min([np.maximum(low - along, along - high) for low, high in slabs], axis=0)
+        return np.maximum(aside, up - 0.3)
+
+    def clear_along(self, spheres, start, ahead, along):
+        places = start + along[:, None] * ahead
+        return bool((self.distance(places[:, None] + spheres[:, :3]) > spheres[:, 3]).all())
+
+
+@pytest.mark.parametrize("among_walls", [False, True])
+def test_a_hand_goes_off_what_it_touches_and_not_through_the_wall_behind_it(world, among_walls):
+    point = np.array([0.0, 0.0, 1.0])
+    at = dataclasses.replace(world)
+    at.grip = lambda hand: point
+    at.hand_axes = lambda hand, rotation=None: (np.array([0.0, 0.0, 1.0]), np.array([-1.0, 0.0, 0.0]))
+    at.obstacles = lambda *_: _BetweenWalls(point)
+    at.resting = lambda hand, stance: point + np.array([0.3, 0.0, 0.8])
+    way = opening.way_off(at, 1, among_walls)
+    first = next((phase.pos for phase in way if phase.pos is not None), tuple(point))
+    assert (first[0] < _BetweenWalls.behind[0]) == among_walls
+
+
 def test_a_robot_stands_beside_what_it_takes_and_above_it_at_last(world):
     """A board that it stood on, it would raise against its body."""
     (x, y, _), far = world.com("book"), world.body.trunk[0] + 0.5
