@@ -389,6 +389,15 @@ def straight(
     return obstacles.clear_along(spheres, np.asarray(start, float), way / apart, along)
 
 
+def stays_clear(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], start: np.ndarray, end: np.ndarray) -> bool:
+    """Whether none of a hand's spheres comes to something on a straight line after it was off all. Arguments as of
+    `straight`."""
+    count = max(2, int(np.ceil(np.linalg.norm(end - start) / STEP)) + 1)
+    places = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
+    clear = obstacles.distance(places[:, None] + spheres[:, :3]) > spheres[:, 3]
+    return not (clear[:-1] & ~clear[1:]).any()
+
+
 def _where_negative(
     value: Float[np.ndarray, "*n"], slope: Float[np.ndarray, "*#n"] | float
 ) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:

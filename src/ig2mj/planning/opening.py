@@ -8,10 +8,9 @@ import itertools
 from collections.abc import Callable, Generator, Iterator, Mapping
 
 import numpy as np
-from jaxtyping import Float
 
 from ig2mj.geometry.host_rotations import turn_onto
-from ig2mj.planning.clearance import Obstacles, hand_way
+from ig2mj.planning.clearance import Obstacles, hand_way, stays_clear
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasps import AT_OBJECT
 from ig2mj.planning.joints import AJAR, OPEN_TO, FaceGrip, OpenableJoint, openable_joints
@@ -55,9 +54,8 @@ PUSH_IN, PRESS = 0.03, 0.004
 EASED = 0.02
 """m that a hand goes off a face slowly which it has pressed on: a door that is let go at once springs open again."""
 
-OFF, NEXT = (0.0, 0.1, 0.2), 0.01
-"""m that a hand goes off a link that it has moved, before it goes back to where it rests, and between places of that
-way that are looked at."""
+OFF = (0.0, 0.1, 0.2)
+"""m that a hand goes off a link that it has moved, before it goes back to where it rests."""
 
 SHUT, MOVED = 0.01, 0.05
 """Share of a joint's range up to which it counts as shut, and change of it after which the same way is tried again."""
@@ -203,20 +201,12 @@ def way_off(world: PlannedWorld, hand: int, among_walls: bool = False) -> Progra
         there = spheres * (1.0, 1.0, 1.0, share)
         for off in (-palm, -ahead(world.stance.yaw), UP, -fingers):
             for apart in OFF:
-                if among_walls and not _stays_clear(obstacles, there, start, start + apart * off):
+                if among_walls and not stays_clear(obstacles, there, start, start + apart * off):
                     break
                 way = hand_way(obstacles, there, start + apart * off, end)
                 if way is not None:
                     return [*travel(hand, [start + apart * off, *way], None), *rest(hand)]
     return []
-
-
-def _stays_clear(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], start: Vector, end: Vector) -> bool:
-    """Whether none of a hand's spheres comes to something on a straight line after it was off all."""
-    count = max(2, int(np.ceil(np.linalg.norm(end - start) / NEXT)) + 1)
-    places = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
-    clear = obstacles.distance(places[:, None] + spheres[:, :3]) > spheres[:, 3]
-    return not (clear[:-1] & ~clear[1:]).any()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
