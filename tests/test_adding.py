@@ -19,6 +19,8 @@ from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.tasks.experts import Expert
 from ig2mj.tasks.registry import TASKS, load_task
 
+pytestmark = pytest.mark.slow
+
 FILES = {
     "A predicate": "ig2mj/predicates/definitions/raised.py",
     "A sensor": "ig2mj/sensors/definitions/clearance.py",

@@ -38,6 +38,7 @@ def energy(world: GraspingWorld, name: str) -> float:
     return float(0.5 * (model.body_inertia[body] @ speed[:3] ** 2 + model.body_mass[body] * speed[3:] @ speed[3:]))
 
 
+@pytest.mark.slow
 def test_a_hand_takes_hold_when_it_is_more_than_half_closed_and_nothing_jumps(tiny_home_folder):
     world = over_the_can(tiny_home_folder)
     world.act(times=2, right_hand_trigger=0.25)
@@ -65,6 +66,7 @@ def test_a_hand_takes_hold_when_it_is_more_than_half_closed_and_nothing_jumps(ti
     assert not world.view.held.any()
 
 
+@pytest.mark.slow
 def test_what_a_closed_hand_lets_go_is_not_thrown(tiny_home_folder):
     """Fingers that go on to close while contacts are dropped would be inside of it when these come back."""
     world = over_the_can(tiny_home_folder)

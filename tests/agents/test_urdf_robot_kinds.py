@@ -207,6 +207,7 @@ def two_hands(tmp_path_factory) -> pathlib.Path:
     return converted(made, *gripper("l_", "base", "0 0.3 0.4"), *gripper("r_", "base", "0 -0.3 0.4"), name="twin")
 
 
+@pytest.mark.slow
 def test_each_gripper_of_several_has_a_hand_and_a_number_of_its_own(two_hands, home):
     robot = UrdfRobot.load(two_hands)
     assert [(g.joints, g.hand) for g in robot.layout.grippers] == [

@@ -199,6 +199,7 @@ def test_a_closed_sticky_hand_takes_hold_again_of_what_is_put_back_into_it(tiny_
     assert world.held == [None, "can"]
 
 
+@pytest.mark.slow
 def test_a_mitten_takes_hold_again_only_after_the_contact_has_ended(tiny_home_folder):
     world = in_hand(tiny_home_folder, "mitten", "can", -0.05)
     simulation = world.simulation

@@ -16,6 +16,7 @@ def test_the_network_learns_what_depends_on_two_facts_together():
     assert [policy(row) for row in facts] == action.tolist()
 
 
+@pytest.mark.slow
 def test_a_policy_that_has_learned_the_planners_steps_reaches_the_goal():
     env = ig2mj.make("goal/small_home (inside apple_0 fridge_0)", action_space="primitives", rung="symbolic")
     steps = demonstrations(env, 2, seed=0)

@@ -26,6 +26,7 @@ from ig2mj.worlds.random_streams import episode_keys
 START = (0.1, 0.25, 0.9)
 
 
+@pytest.mark.slow
 def test_homes_that_ship_are_soaked_without_the_converter():
     """A GPU host has neither it nor what it reads files with."""
     said = "import sys, benchmarks.soak.homes; print([m for m in sys.modules if m.startswith('ig2mj_converters')])"

@@ -104,6 +104,7 @@ def test_the_report_shows_all_rows_and_lets_only_sound_ones_count(tmp_path):
     assert json.loads((folder / "result.json").read_text())["machine"]["what"] == "a GPU"
 
 
+@pytest.mark.slow
 def test_a_newer_row_takes_the_place_of_the_same_case(tmp_path):
     first, second = tmp_path / "a.jsonl", tmp_path / "b.jsonl"
     first.write_text(json.dumps(ROW) + "\n" + json.dumps(ROW | {"worlds": 1}) + "\n")

@@ -47,6 +47,7 @@ def use_worker(monkeypatch, code):
     monkeypatch.setattr(coacd_process, "COMMAND", (sys.executable, "-c", code))
 
 
+@pytest.mark.slow
 def test_a_hanging_worker_is_stopped_and_one_hull_stands_in(monkeypatch):
     use_worker(monkeypatch, "while True: pass")
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
@@ -136,6 +137,7 @@ def test_an_exception_in_the_worker_is_told_in_one_line(monkeypatch):
         coacd_process.run_coacd(np.zeros((3, 3)), np.zeros((1, 3), int), {}, cpu_limit=30)
 
 
+@pytest.mark.slow
 def test_a_second_conversion_is_ten_times_faster_and_equal():
     options = HullOptions(coacd_threshold=0.2)
     started = time.perf_counter()
@@ -154,6 +156,7 @@ def test_a_second_conversion_is_ten_times_faster_and_equal():
         np.testing.assert_array_equal(a.pose, b.pose)
 
 
+@pytest.mark.slow
 def test_decomposition_is_the_same_on_any_number_of_threads():
     results = [decompose_link([bowl()], HullOptions(cache=False, coacd_threshold=0.4, threads=t)) for t in (1, 2)]
     assert results[0].after == results[1].after

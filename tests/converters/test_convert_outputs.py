@@ -59,6 +59,7 @@ def test_scene_xml_needs_nothing_but_its_folder(house, tmp_path):
         assert str(house.folder.parent) not in (moved / name).read_text()
 
 
+@pytest.mark.slow
 def test_equal_input_gives_equal_bytes_and_jobs_make_no_difference(convert, house):
     with inputs.recording() as shared:
         again = convert(jobs=2, cache=False)

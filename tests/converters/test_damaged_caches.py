@@ -24,6 +24,7 @@ def bomb() -> bytes:
     return out.getvalue()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [b"", b"nothing", "bomb", "no facts"])
 def test_changed_results_of_geometry_are_absent(tmp_path, monkeypatch, content):
     monkeypatch.setattr(piece_cache, "folder", lambda: tmp_path)

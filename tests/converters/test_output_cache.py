@@ -257,6 +257,7 @@ def test_pipes_are_not_waited_for(tmp_path):
         inputs.content(tmp_path / "pipe.png")
 
 
+@pytest.mark.slow
 def test_homes_with_shared_meshes_come_out_of_the_cache_with_them(own, tmp_path, capsys):
     """A second `homes convert` of what has not changed takes no time and gives the same bytes."""
 

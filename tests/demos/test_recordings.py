@@ -190,6 +190,7 @@ def test_a_recording_outlives_a_change_of_looks_and_names(env, recorded, tmp_pat
         assert replayer(check=True).differences == []
 
 
+@pytest.mark.slow
 def test_a_thin_recording_has_actions_and_first_and_last_frames_and_comes_out_the_same(env, recorded, tmp_path):
     thin = tmp_path / "thin.h5"
     with Recording(recorded[0]) as recording:
@@ -220,6 +221,7 @@ def test_a_thin_recording_has_actions_and_first_and_last_frames_and_comes_out_th
         observe(Replayer(recording, env=env), lambda *run: None)
 
 
+@pytest.mark.slow
 def test_metrics_say_what_was_moved_reached_held_and_looked_at(env, recorded, tmp_path):
     found = metrics_of(recorded[0], settle=3, env=env)
     assert [run["frames"] for run in found] == [13, 13, 13, 13]

@@ -13,6 +13,7 @@ from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.errors import EngineError
 
 
+@pytest.mark.slow
 def test_kernels_of_a_step_become_programs_of_a_gpu(tiny_home, tmp_path, monkeypatch):
     engine = WarpEngine(tiny_home, 2)
     there = ahead.launches_on_gpu(engine)

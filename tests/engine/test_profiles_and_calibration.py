@@ -123,6 +123,7 @@ def test_an_engine_takes_over_its_scenes_start_whatever_its_sizes_say(tiny_home,
     assert engine._template._impl.contact__dist.shape == (worlds * sizes.contacts,)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("agents", [[], [Humanoid()]], ids=["bare", "humanoid"])
 def test_sizes_of_every_home_hold_its_start_in_any_batch(agents):
     """Cedar has 428 contacts before it has come to rest, and its profile room for 324 in two worlds together."""

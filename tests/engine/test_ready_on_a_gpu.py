@@ -183,6 +183,7 @@ def test_worlds_may_start_inside_the_block(engine, loaded, gpu):
         assert engine.loading.done() and engine.loading_of_others[0].done()
 
 
+@pytest.mark.slow
 def test_an_interrupted_wait_can_be_repeated(engine, held, monkeypatch):
     def interrupted(loading: Any, scene: str) -> int:
         raise KeyboardInterrupt
@@ -194,6 +195,7 @@ def test_an_interrupted_wait_can_be_repeated(engine, held, monkeypatch):
     assert engine.reset() is not None
 
 
+@pytest.mark.slow
 def test_tiles_are_made_in_processes_of_their_own(tmp_path, monkeypatch):
     prepare_warp()
     wp.init()

@@ -58,6 +58,7 @@ def differing(one, other):
     ]
 
 
+@pytest.mark.slow
 def test_the_same_step_from_a_used_state_is_refused_on_the_native_engine(env, actions):
     """It gave another result: the base moved 7.7 mm, then 30.2 mm."""
     state = env.reset(0)

@@ -31,6 +31,7 @@ def numbers(env, state, name):
     return np.asarray(state.obs["privileged_state"])[:, at]
 
 
+@pytest.mark.slow
 def test_every_promise_is_kept_in_a_batch_of_any_size(env):
     api_test(env, other=ig2mj.make("CookingMeat", worlds=1, pool_size=ROWS))
 

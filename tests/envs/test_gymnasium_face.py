@@ -52,6 +52,7 @@ def test_gymnasium_s_checker_is_content():
     env.close()
 
 
+@pytest.mark.slow
 def test_same_step_gives_the_last_observation_beside_the_new_one(short):
     env = short(AutoresetMode.SAME_STEP)
     env.reset(seed=0)

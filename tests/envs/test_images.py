@@ -27,6 +27,7 @@ def drive(env, steps: int) -> list:
     return states
 
 
+@pytest.mark.slow
 def test_a_state_is_one_image_and_can_be_stepped_afterwards(env):
     state = env.start_from(np.arange(2))
     image = env.render(state, world=1, **SIZE)

@@ -26,6 +26,7 @@ def _world(count: int) -> HandWorld:
     return HandWorld(*items)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rests", [False, True])
 @pytest.mark.parametrize("backend", ["cpu", "gpu"])
 def test_the_first_object_is_the_one_of_least_depth(backend, rests, monkeypatch):

@@ -134,6 +134,7 @@ def test_a_falling_point_stops_at_the_first_surface_or_at_once_when_inside(house
     assert inside.any() and np.isfinite(reach[at_start]).any() and np.isinf(reach).any()
 
 
+@pytest.mark.slow
 def test_works_under_vmap_over_variants(house):
     """A batch of batches: what a search over placements does."""
     tables, body_pos, body_quat = house

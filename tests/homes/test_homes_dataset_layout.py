@@ -192,6 +192,7 @@ def test_another_seed_gives_other_bytes(root: pathlib.Path, tmp_path: pathlib.Pa
     assert (tmp_path / "other" / urdf).read_bytes() != (root / urdf).read_bytes()
 
 
+@pytest.mark.slow
 def test_rebuilding_a_category_leaves_nothing_of_the_old_one(root: pathlib.Path):
     stray = root / "objects/jar/old_model"
     stray.mkdir()

@@ -65,6 +65,7 @@ def test_factors_come_in_sets_and_all_else_is_of_the_episode():
     assert "robot_start" not in draws.values(("robot_start",), [0], "humanoid")
 
 
+@pytest.mark.slow
 def test_shipped_episodes_have_every_axis_and_values_of_each():
     files = {name: Episodes.load(file) for name, file in shipped_episodes().items()}
     assert files["CookingMeat"].count == 200

@@ -82,6 +82,7 @@ def test_who_guesses_nothing_needs_no_scales_of_what_is_hidden(tmp_path):
         np.testing.assert_allclose(ours, theirs, atol=2e-3, err_msg="half precision")
 
 
+@pytest.mark.slow
 def test_sac_begins_as_a_policy_whose_predicting_layers_are_not_in_its_file(tmp_path):
     """The actor does as the policy does; what critics alone see is scaled by what the run sees."""
     perception = made("none", encoder="small").perception

@@ -22,6 +22,7 @@ ANYWHERE = (*LAMP, "with:attached:light_bulb_0>table_lamp_0")
 GOAL = "(attached light_bulb_0 table_lamp_0)"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("goal", [GOAL, "attach the light bulb to the table lamp", "screw the bulb into the lamp"])
 def test_a_bulb_is_taken_and_attached(goal):
     assert planned(goal, PAIR) == ["grasp light_bulb_0", "attach light_bulb_0 table_lamp_0"]
@@ -32,6 +33,7 @@ def test_it_comes_after_placements():
     assert steps[-1].startswith("attach") and "place_on_top table_lamp_0 breakfast_table_0" in steps
 
 
+@pytest.mark.slow
 def test_what_cannot_be_attached_is_refused_with_the_remedy():
     with pytest.raises(PlanningError, match="add 'with:attached:light_bulb_0>table_lamp_0'"):
         planned(GOAL, LAMP)
@@ -56,6 +58,7 @@ def test_it_is_set_on_the_symbolic_rung_and_the_hand_is_empty_then():
     assert made.facts(0).held == () and made.facts(0).holds("attached", "light_bulb_0", "table_lamp_0")
 
 
+@pytest.mark.slow
 def test_its_motion_is_planned_on_the_kinematic_rung():
     found, known = problem(GOAL, PAIR)
     ((_, made),) = kinematic_episodes(known, found, None, [0])

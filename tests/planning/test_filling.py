@@ -41,11 +41,13 @@ def planned(goal: str, folder=None) -> list[str]:
     return [str(step) for step in plan.steps]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("goal", ["(filled bowl_0 water)", "(contains bowl_0 water)", "fill the bowl with water"])
 def test_a_bowl_is_filled_below_a_tap_that_runs(goal):
     assert planned(goal)[2:] == ["toggle_on sink_0", "grasp bowl_0", "fill bowl_0 sink_0"]
 
 
+@pytest.mark.slow
 def test_what_lies_in_a_bowl_is_taken_out_first():
     out, down = planned("(filled bowl_0 water)")[:2]
     assert out == "grasp apple_0" and down.startswith("place_on_top apple_0 ")

@@ -36,6 +36,7 @@ def test_what_is_there_already_is_only_stirred():
     assert planned("mix seawater in the bowl", TOGETHER)[-1] == "mix bowl_0 spoon_0 seawater"
 
 
+@pytest.mark.slow
 def test_without_ingredients_or_stirrer_it_is_refused():
     with pytest.raises(PlanningError, match="seawater"):
         planned(GOAL, (*SPOON, "substances:water@carafe_0,salt,seawater", "carafe@on_top:breakfast_table_0"))
@@ -59,6 +60,7 @@ def test_litres_stay_the_same_on_the_symbolic_rung():
     assert "lacks" in done(made, "mix", "bowl_0", "spoon_0", "seawater").detail
 
 
+@pytest.mark.slow
 def test_its_motion_is_planned_on_the_kinematic_rung():
     found, known = problem(GOAL, TOGETHER)
     ((_, made),) = kinematic_episodes(known, found, None, [0])
@@ -66,6 +68,7 @@ def test_its_motion_is_planned_on_the_kinematic_rung():
     assert result.success, [(str(r.step), r.outcome) for r in result.steps]
 
 
+@pytest.mark.slow
 def test_pages_and_ground_steps_have_it_and_exported_plans_the_recipe(tmp_path):
     found, known = problem(GOAL, TOGETHER)
     asked = ("mix", "bowl_0", "spoon_0", "seawater")

@@ -62,6 +62,7 @@ def amounts(made: SymbolicRung) -> tuple[float, float]:
     return float(np.asarray(states.volume).sum()), float(np.asarray(states.lost).sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("goal", "last"),
     [
@@ -77,6 +78,7 @@ def test_what_a_carton_holds_is_poured_out_of_it(goal, last):
     assert planned(goal) == ["open fridge_0", "grasp milk_0", last]
 
 
+@pytest.mark.slow
 def test_water_comes_from_where_it_takes_fewest_steps():
     assert planned("(filled mug_0 water)", JUG) == ["grasp carafe_0", "pour carafe_0 mug_0 water"]
     assert planned("(filled mug_0 water)", ()) == ["toggle_on sink_0", "grasp mug_0", "fill mug_0 sink_0"]
@@ -132,6 +134,7 @@ def test_states_are_set_and_litres_stay_the_same():
     assert "bowl_0 contains no water" in done(made, "pour", "bowl_0", "mug_0", "water").detail
 
 
+@pytest.mark.slow
 def test_its_motion_is_planned_on_the_kinematic_rung():
     found, known = problem("(and (filled mug_0 water) (covered coffee_table_0 water))", JUG)
     ((_, made),) = kinematic_episodes(known, found, None, [0])

@@ -23,6 +23,7 @@ SPRAY = ("atomizer@on_top:coffee_table_0", "substances:water@atomizer_0,vinegar"
 STEPS = ["grasp atomizer_0", "spray breakfast_table_0 atomizer_0 water"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "goal",
     [
@@ -37,6 +38,7 @@ def test_a_table_is_sprayed_with_what_an_atomizer_holds(goal):
     assert planned(goal, SPRAY) == STEPS
 
 
+@pytest.mark.slow
 def test_cloth_is_soaked_by_a_spray_or_below_a_tap_whichever_is_shorter():
     assert planned("(saturated dishtowel_0 water)", SPRAY)[-1] == "spray dishtowel_0 atomizer_0 water"
     assert planned("(saturated dishtowel_0 water)", ())[-1] == "soak dishtowel_0 sink_0"
@@ -55,6 +57,7 @@ def test_a_robot_with_one_hand_has_nothing_to_spray_with():
     assert offered["Spray with water"] == ("spray", "sofa_0", "atomizer_0", "water")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step, meant", [
     (("spray", "mug_0"), "covered"), (("spray", "dishtowel_0"), "saturated"),
     (("spray", "breakfast_table_0"), "covered"), (("pour", "mug_0"), "contains"),
@@ -81,6 +84,7 @@ def test_states_are_set_and_litres_stay_the_same():
     assert "contains no vinegar" in done(made, *asked[:3], "vinegar").detail
 
 
+@pytest.mark.slow
 def test_its_motion_is_planned_on_the_kinematic_rung():
     found, known = problem("(covered breakfast_table_0 water)", SPRAY)
     ((_, made),) = kinematic_episodes(known, found, None, [0])

@@ -165,6 +165,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_a_forked_process_is_refused_at_once():
     done = run(FORK)
     refused = "this process was forked from one in which JAX runs, whose th"

@@ -179,6 +179,7 @@ def _name(node: ast.expr) -> str:
     return getattr(node, "attr", getattr(node, "id", ""))
 
 
+@pytest.mark.slow
 def test_every_program_of_the_table_is_compiled_somewhere():
     assert set(PROGRAMS) <= compiled_functions(), sorted(set(PROGRAMS) - compiled_functions())
 

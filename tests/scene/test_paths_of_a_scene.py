@@ -116,6 +116,7 @@ def test_a_scene_that_is_too_large_is_refused_unread(tmp_path):
     run_limited(read_mjcf, tmp_path / "scene.xml").check(InputError, "IG2MJ_LIMIT_XML_BYTES raises it")
 
 
+@pytest.mark.slow
 def test_what_is_just_not_too_large_is_counted_within_the_limits(tmp_path):
     (tmp_path / "scene.xml").write_text("<mujoco>" + "<a/>" * 4_000_000 + "</mujoco>")
     run_limited(read_mjcf, tmp_path / "scene.xml").check(InputError, "IG2MJ_LIMIT_MJCF_ELEMENTS raises it")

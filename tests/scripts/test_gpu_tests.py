@@ -83,6 +83,7 @@ def test_what_takes_longest_is_there(repository, monkeypatch):
         assert not test or f"def {test[0]}(" in (repository / file).read_text(encoding="utf-8"), part
 
 
+@pytest.mark.slow
 def test_a_crash_is_a_failure_and_the_file_goes_on(place):
     write(place, crashes=CRASHES, mixed=MIXED)
     run = start(place)

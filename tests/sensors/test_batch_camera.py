@@ -164,6 +164,7 @@ def shoot(engine, model, physics):
     return lambda states, now=physics: jax.tree.map(np.asarray, call(now, view, states))
 
 
+@pytest.mark.slow
 def test_constants_of_programs_hold_no_unwritten_memory(engine, model, monkeypatch):
     """Another number in each process would give another program, which no cache has."""
     empty = wp.empty

@@ -82,6 +82,7 @@ def test_spots_are_the_points_that_are_covered():
     assert set(np.asarray(slots.owner)[0, shown]) == {HOME.index["sponge"]}
 
 
+@pytest.mark.slow
 def test_more_spots_than_slots_fill_all_slots():
     states = coat.set_covered(MODEL, initial_states(MODEL, 1), HOME.index["sponge"], "mud", True)
     states = coat.set_covered(MODEL, states, HOME.index["floor"], "olive_oil", True)
@@ -151,6 +152,7 @@ def _images(folder, name: str, litres: float, celsius: float = 23.0):
     return jax.tree.map(np.asarray, call(physics, engine.view(physics), states))
 
 
+@pytest.mark.slow
 def test_images_of_both_renderers_show_the_level_of_a_glass(folder):
     """The level is where the glass is full to, in the depths; colours differ by less than a fiftieth."""
     bottom, height = 2 * WALL, 2 * POURED_GLASS[2]

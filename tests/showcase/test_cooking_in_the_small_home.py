@@ -18,6 +18,8 @@ from ig2mj.showcase.temperature_log import TemperatureLog
 from ig2mj.simulation import Simulation
 from ig2mj.states.definitions import toggled_on
 
+pytestmark = pytest.mark.slow
+
 
 def _first_step_at(log: TemperatureLog, name: str, celsius: float) -> int | None:
     """The first control step after which the object is on the other side of a temperature than at the start."""

@@ -36,6 +36,7 @@ def equal(one: Pool, other: Pool) -> bool:
 # Those that ship.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("split", SEEDS)
 def test_every_activity_s_pool_ships_in_the_usual_size(split):
     """A change of a task, its home or the sampler's version asks for new ones: `make pools`."""

@@ -70,6 +70,7 @@ def test_numbers_of_geoms_are_not_blended_where_they_meet(scene, monkeypatch):
     assert samples == [0, 4] and scene[0].vis.quality.offsamples == 4
 
 
+@pytest.mark.slow
 def test_colours_and_shape_of_the_picture(scene, backend):
     image = offscreen.render(*scene, "above", width=64, height=48, backend=backend)
     assert image.dtype == np.uint8 and image.shape == (48, 64, 3)

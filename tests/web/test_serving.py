@@ -146,6 +146,7 @@ def test_an_unwanted_message_is_dropped_and_the_page_stays():
         assert page.recv(timeout=10) == "ping"
 
 
+@pytest.mark.slow
 def test_a_thousand_bad_messages_and_requests_harm_nobody():
     """Wrong tokens, malformed and oversized messages, bytes that are no HTTP: each ends its own connection alone."""
     random.seed(0)

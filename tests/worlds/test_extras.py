@@ -119,6 +119,7 @@ def test_a_joint_gives_way_to_a_pull_of_more_than_250_newtons_a_kilogram(simulat
         assert simulation.predicate("attached", "lamp", "board") == holds
 
 
+@pytest.mark.slow
 def test_fire_spreads_to_what_is_near_and_burns_out(simulation):
     assert simulation.set_predicate("on_fire", "paper") and simulation.predicate("on_fire", "paper")
     assert _celsius(simulation, "paper") == pytest.approx(1000)

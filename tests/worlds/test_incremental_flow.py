@@ -76,6 +76,7 @@ def test_what_moves_elsewhere_leaves_the_steps_ahead_valid(monkeypatch):
     assert np.asarray(coat.covered(model, ours))[0, home.index["block"]].any()
 
 
+@pytest.mark.slow
 def test_contents_at_rest_are_asked_only_where_something_moves_that_they_depend_on(monkeypatch):
     home = world(Item("block", (((0, 0, 0), (0.04, 0.04, 0.04)),), pos=(-2, -2, 0.04)))
     model = home.model()

@@ -130,6 +130,7 @@ def test_large_obj(folder, what):
     run_limited(read_collision_file, folder.write("c.obj", text)).check(InputError if message else None, message or "")
 
 
+@pytest.mark.slow
 def test_an_obj_of_many_materials_is_drawn_in_one_colour(folder):
     text = TRIANGLE + "".join(f"usemtl m{i}\nf 1 2 3\n" for i in range(200_000))
     mtl = "".join(f"newmtl m{i}\nKd {i / 200_000} 0 0\n" for i in range(200_000))

@@ -151,6 +151,7 @@ def test_an_expert_goes_where_an_object_is_believed_to_be(fruit):
     np.testing.assert_allclose(expert(state, only), expert(state), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_an_adviser_labels_for_what_the_actor_believes_and_for_the_truth_in_the_first_step():
     targets, memory, scales = setting()
     asked = []

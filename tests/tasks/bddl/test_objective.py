@@ -6,11 +6,13 @@ import dataclasses
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 import ig2mj
 from ig2mj.predicates.compile import GoalStatus
 
 
+@pytest.mark.slow
 def test_the_state_says_how_far_an_activitys_doors_are_open():
     env = ig2mj.make("activity/locking_every_door", worlds=1, engine="native", pool_size=1)
     tables, names = env.scene.tables, list(env.privileged_names)
