@@ -31,6 +31,9 @@ FAR = 0.3
 STEP = 0.03
 """m between the points of a way at which it is checked."""
 
+CORE = 0.01
+"""m from a point of a hand within which it is in something, and between places of a line of which that is asked."""
+
 LIFTS = (0.1, 0.25, 0.45)
 """m above start and goal at which a hand goes across where the straight way is blocked."""
 
@@ -389,13 +392,13 @@ def straight(
     return obstacles.clear_along(spheres, np.asarray(start, float), way / apart, along)
 
 
-def stays_clear(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], start: np.ndarray, end: np.ndarray) -> bool:
-    """Whether none of a hand's spheres comes to something on a straight line after it was off all. Arguments as of
-    `straight`."""
-    count = max(2, int(np.ceil(np.linalg.norm(end - start) / STEP)) + 1)
+def passes_wall(obstacles: Obstacles, points: Float[np.ndarray, "S 3"], start: np.ndarray, end: np.ndarray) -> bool:
+    """Whether one of a hand's points (from its grasp point, m, world axes), moved along a straight line, comes into
+    something after it was off all: walls are passed, what only touches the hand is not."""
+    count = max(2, int(np.ceil(np.linalg.norm(end - start) / CORE)) + 1)
     places = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
-    clear = obstacles.distance(places[:, None] + spheres[:, :3]) > spheres[:, 3]
-    return not (clear[:-1] & ~clear[1:]).any()
+    clear = obstacles.distance(places[:, None] + points) > CORE
+    return bool((clear[:-1] & ~clear[1:]).any())
 
 
 def _where_negative(

@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping
 import numpy as np
 
 from ig2mj.geometry.host_rotations import turn_onto
-from ig2mj.planning.clearance import Obstacles, hand_way, stays_clear
+from ig2mj.planning.clearance import Obstacles, hand_way, passes_wall
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasps import AT_OBJECT
 from ig2mj.planning.joints import AJAR, OPEN_TO, FaceGrip, OpenableJoint, openable_joints
@@ -192,7 +192,7 @@ def way_off(world: PlannedWorld, hand: int, among_walls: bool = False) -> Progra
     keeps clear of all by its spheres where it can: a leaf that is brushed swings on.
 
     Args:
-      among_walls: what the hand comes to on the way off bars it, too, such as the wall of a bag that it is in.
+      among_walls: the hand passes through nothing on the way off, such as the wall of a bag that it is in.
     """
     fingers, palm = world.hand_axes(hand)
     spheres, obstacles = world.spheres(fingers, palm), world.obstacles()
@@ -201,7 +201,7 @@ def way_off(world: PlannedWorld, hand: int, among_walls: bool = False) -> Progra
         there = spheres * (1.0, 1.0, 1.0, share)
         for off in (-palm, -ahead(world.stance.yaw), UP, -fingers):
             for apart in OFF:
-                if among_walls and not stays_clear(obstacles, there, start, start + apart * off):
+                if among_walls and passes_wall(obstacles, there[:, :3], start, start + apart * off):
                     break
                 way = hand_way(obstacles, there, start + apart * off, end)
                 if way is not None:
