@@ -19,8 +19,6 @@ from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.tasks.experts import Expert
 from ig2mj.tasks.registry import TASKS, load_task
 
-pytestmark = pytest.mark.slow
-
 FILES = {
     "A predicate": "ig2mj/predicates/definitions/raised.py",
     "A sensor": "ig2mj/sensors/definitions/clearance.py",

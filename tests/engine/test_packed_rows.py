@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from ig2mj.engine.mjx.packed_rows import PackedRows
+from ig2mj.engine.packed_rows import PackedRows
 
 TREE = {
     "truth": jnp.array([[True, False], [False, True], [True, True]]),

@@ -10,7 +10,7 @@ from still_world import still_world
 import ig2mj
 from ig2mj.agents import Humanoid
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning import clutter, grasping, grasps, opening, placing, spots
+from ig2mj.planning import clutter, grasping, grasps, letting_go, opening, placing, spots
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.free_floor import FreeFloor
 from ig2mj.planning.joints import openable_joints
@@ -304,9 +304,9 @@ def test_what_a_hand_has_let_go_bars_its_way_back_where_it_stands_there(world):
     at.grip = lambda hand: beside
     at.hand_axes = lambda hand, rotation=None: (np.array([0.0, 0.0, 1.0]), np.array([-1.0, 0.0, 0.0]))
     up, across = (beside + np.array(way) for way in ((0.0, 0.0, 0.4), (-0.4, 0.0, 0.0)))
-    assert not placing._is_caught(at, "book", 1, [up])
-    assert placing._is_caught(at, "book", 1, [across, up])
-    assert not placing._is_caught(at, "ball", 1, [across, up])
+    assert not letting_go.is_caught(at, "book", 1, [up])
+    assert letting_go.is_caught(at, "book", 1, [across, up])
+    assert not letting_go.is_caught(at, "ball", 1, [across, up])
 
 
 class _BetweenWalls(Obstacles):

@@ -66,7 +66,7 @@ def plan(monkeypatch):
         monkeypatch.setattr(placing, "hand_path", hand_path)
         monkeypatch.setattr(placing, "turning_point", lambda o, s, start, yaw: np.array([yaw, 0.0, 0.0]))
         monkeypatch.setattr(placing, "grip_for", lambda *_: (np.zeros(3), SPOT.quat, np.eye(3)))
-        monkeypatch.setattr(placing, "_spheres", lambda *_: np.zeros((1, 4)))
+        monkeypatch.setattr(placing, "spheres_at", lambda *_: np.zeros((1, 4)))
         monkeypatch.setattr(placing, "_drop", lambda *_: 0.0)
         found = placing._plan(_World(opening), "on_top", "box", 0, [SPOT])
         return found, tried, most_asked

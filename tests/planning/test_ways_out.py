@@ -9,10 +9,11 @@ from ig2mj.geometry.host_rotations import about_vertical
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.free_floor import POCKET, FreeFloor
 from ig2mj.planning.grasping import _off_furniture, off_others_things
+from ig2mj.planning.letting_go import drawn_back
 from ig2mj.planning.moves import RETREAT, SLACK, _as_close
 from ig2mj.planning.occupancy import RESOLUTION, Occupancy
 from ig2mj.planning.phases import Until
-from ig2mj.planning.placing import DEEP_DROPS, _drawn_back, _drop
+from ig2mj.planning.placing import DEEP_DROPS, _drop
 from ig2mj.planning.spots import ends_down
 from ig2mj.planning.world import PlannedWorld
 
@@ -96,7 +97,7 @@ def test_a_hand_that_has_let_go_is_drawn_back_as_far_as_it_has_room_behind_it():
     over, deep = np.array([0.0, 0.0, 0.3]), np.array([0.0, 0.0, 0.05])
 
     def back(target, palm):
-        return list(np.round(_drawn_back(_Bucket(), hand, target, palm) - target, 6))
+        return list(np.round(drawn_back(_Bucket(), hand, target, palm) - target, 6))
 
     assert back(over, palm) == [-RETREAT, 0, 0]  # above the bucket
     assert back(deep, -up) == [0, 0, RETREAT]  # in it, with room above

@@ -21,8 +21,6 @@ from ig2mj.states.spec import KEEPS, StateSpec, copied, filled, given_from_outsi
 from ig2mj.states.update import EVENTS, HEAT
 from ig2mj.states.world import ExtendedStates
 
-pytestmark = pytest.mark.slow
-
 STORY = """
 import json, sys
 

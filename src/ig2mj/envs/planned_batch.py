@@ -31,7 +31,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.base import GATHERED
-from ig2mj.engine.mjx.packed_rows import PackedRows
+from ig2mj.engine.packed_rows import PackedRows
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.planning_processes import PlanningProcesses
@@ -384,10 +384,11 @@ class _Episodes:
         step = self.batch.begin_step(action)
         concurrent.futures.wait([step], SETTING_OUT)
         self._hand_over()
-        while self.planners.asked and not self.planners.here and not self.batch.stepped.poll():
+        while self.planners.asked and not self.planners.here and not step.done():
             self._take(None, self.batch.stepped)
-        self.batch.stepped.recv_bytes()
         stepped = step.result()
+        while self.batch.stepped.poll():  # also of steps that were interrupted
+            self.batch.stepped.recv_bytes()
         spent.stepping += stepped - began
         results = self.batch.results()
         for world in np.flatnonzero(results.terminated | results.truncated).tolist():

@@ -107,6 +107,14 @@ def about_vertical(angle: float) -> Float[np.ndarray, "3 3"]:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def turn_about(axis: Float[np.ndarray, "3"], angle: float) -> Float[np.ndarray, "3 3"]:
+    """Rotation matrix about a unit vector by an angle in rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = axis
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + s * k + (1 - c) * (k @ k)
+
+
 def turn_onto(one: Float[np.ndarray, "3"], other: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     """Matrix of the least rotation from one direction to another."""
     a, b = one / np.linalg.norm(one), other / np.linalg.norm(other)

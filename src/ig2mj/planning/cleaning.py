@@ -11,12 +11,13 @@ from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
+from ig2mj.geometry.host_rotations import turn_about
 from ig2mj.planning.cleaning_area import is_behind, is_covered
 from ig2mj.planning.cleaning_strokes import FEW, Stroke, plan_strokes, strokes_here
 from ig2mj.planning.driving import go
 from ig2mj.planning.grasping import grasp, held_again, put_down_others, with_free_hand
 from ig2mj.planning.handing_over import hand_over_in_the_open
-from ig2mj.planning.held_tools import CLOSE, TURNS, HeldTool, Region, regions_of, turn_about
+from ig2mj.planning.held_tools import CLOSE, TURNS, HeldTool, Region, regions_of
 from ig2mj.planning.moves import (
     UP,
     Primitive,
@@ -141,15 +142,13 @@ def clean(predicate: str) -> Callable[[PlannedWorld, Step], Primitive]:
                 if spot is None:
                     continue
                 present = dataclasses.replace(stroke, spot=spot)  # a drawer may have moved
-                program = _program(world, tool, hand, present)
+                program, way = _program(world, tool, hand, present)
                 if not program and strayed(world, hand):
                     yield from go_home_past(world, hand, came)
                     came = []
-                    program = _program(world, tool, hand, present) if tool in world.held else []
+                    program, way = _program(world, tool, hand, present) if tool in world.held else ([], [])
                 if program:
-                    begins = [world.grip(hand)] if floats or not came else came
-                    last = -2 if floats else -3
-                    came = [*begins, *(np.array(p.pos) for p in program[:last] if p.pos is not None)]
+                    came = [*([world.grip(hand)] if floats or not came else came), *way]
                     reason, detail = (yield program), f"{tool} did not take enough off {name}"
         if tool in world.held:
             yield from go_home_past(world, hand_with(world, tool), came)
@@ -214,9 +213,9 @@ def _brought_out(world: PlannedWorld, name: str) -> Generator[Program, str, bool
     return (yield from bring_out(world, name)).done
 
 
-def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Program:
-    """Presses the tool on a particle and lifts it; nothing where the hand has no way there. The planned turn of the
-    tool is tried first."""
+def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> tuple[Program, list[Vector]]:
+    """Presses the tool on a particle and lifts it, and the way there; nothing where the hand has none. The planned turn
+    of the tool is tried first."""
     obstacles, stance, spot = world.obstacles([tool], world.stance), world.stance, stroke.spot
     held = HeldTool(world, tool, hand, stroke.share)
     regions = regions_of(held, stance.yaw, spot.normal)
@@ -237,11 +236,11 @@ def _program(world: PlannedWorld, tool: str, hand: int, stroke: Stroke) -> Progr
             back, goal = [UP, -ahead(stance.yaw), spot.normal], region.above(spot)
             way = hand_path(obstacles, spheres, world.grip(hand), goal, back, follows=follows, strays=strays)
             if way is not None and (follows is None or follows.passes([*way, region.at(spot)])):
-                return _press(world, tool, hand, region, spot, way)
+                return _press(world, tool, hand, region, spot, way), way
             ways += 1
             if ways == FEW:
                 break
-    return []
+    return [], []
 
 
 def _press(world: PlannedWorld, tool: str, hand: int, region: Region, spot: DirtSpot, way: Sequence[Vector]) -> Program:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from ig2mj.geometry.host_rotations import about_vertical, turn_onto
+from ig2mj.geometry.host_rotations import about_vertical, turn_about, turn_onto
 from ig2mj.planning.cleaning_area import cleaning_area
 from ig2mj.planning.grasps import OBLIQUE
 from ig2mj.planning.moves import UP, ahead
@@ -165,8 +165,8 @@ def regions_of(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
     off = [shifted for r in near[:SHIFTED_TURNS] for shifted in r.shifted(normal)]
     if held.world.body.opening is None:
         return [*first, *off]
-    late_ones = [r for r, by in zip(found, late, strict=True) if enough <= by < -RIM]
-    return [*(r for r in first if r not in late_ones), *off, *late_ones]
+    soon = [r for r, by in zip(found, late, strict=True) if by >= max(enough, -RIM)]
+    return [*soon, *off, *(r for r in first if r not in soon)]
 
 
 def _turned_regions(held: HeldTool, yaw: float, normal: Vector) -> list[Region]:
@@ -220,11 +220,3 @@ def axes_along(normal: Vector, level: Vector = EAST) -> tuple[Vector, Vector]:
     across = np.cross(normal, UP) if abs(normal[2]) < 0.9 else level - (level @ normal) * normal
     across = across / np.linalg.norm(across)
     return across, np.cross(normal, across)
-
-
-def turn_about(axis: Vector, angle: float) -> Rotation:
-    """Rotation about a unit vector, rad."""
-    c, s = np.cos(angle), np.sin(angle)
-    x, y, z = axis
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + s * k + (1 - c) * (k @ k)

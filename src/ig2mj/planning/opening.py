@@ -182,9 +182,9 @@ def _moved(world: PlannedWorld, joint: OpenableJoint, hand: int, plan: _JointPla
 def withdraw(world: PlannedWorld, hand: int) -> Program:
     """The empty hand goes back to where it rests, around what it has moved: else it lifts a light box by its open lid.
 
-    Where the hand touches the link, it first goes straight off it.
+    Where the hand touches the link, it first goes straight off it, through nothing else if there is such a way.
     """
-    return way_off(world, hand) or rest(hand)
+    return way_off(world, hand, among_walls=True) or way_off(world, hand) or rest(hand)
 
 
 def way_off(world: PlannedWorld, hand: int, among_walls: bool = False) -> Program:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.geometry.host_rotations import about_vertical, matrix_to_quat, quat_multiply, turn_onto
+from ig2mj.geometry.host_rotations import about_vertical, matrix_to_quat, quat_multiply, turn_about, turn_onto
 from ig2mj.planning.clearance import HELD, Obstacles
 from ig2mj.planning.free_floor import FreeFloor
 from ig2mj.planning.moves import LET_GO, UP, ahead
@@ -108,17 +108,10 @@ def _rotations(about: Rotation, palm: Vector, yaw: float) -> list[Rotation]:
             to = np.sqrt(1.0 - rise**2) * ahead(yaw + aside) + rise * UP
             first = turn_onto(about @ palm, to) @ about
             for roll in ROLLS:
-                rotation = _about(to, roll) @ first
+                rotation = turn_about(to, roll) @ first
                 turned = float(np.arccos(np.clip((np.trace(about.T @ rotation) - 1.0) / 2.0, -1.0, 1.0)))
                 found.append((turned, rotation))
     return [rotation for _, rotation in sorted(found, key=lambda pair: pair[0])]
-
-
-def _about(axis: Vector, angle: float) -> Rotation:
-    """Rotation about a unit vector."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
 
 
 def _falling(

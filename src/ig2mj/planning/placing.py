@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
 import numpy as np
@@ -16,13 +15,11 @@ from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.clearance import HELD, Obstacles, straight
 from ig2mj.planning.driving import go, nearer
 from ig2mj.planning.grasping import grasp, is_graspable, put_down_others, release, with_free_hand
+from ig2mj.planning.letting_go import SPARE, letting_go, spheres_at, way_to_spot
 from ig2mj.planning.moves import (
     ATTEMPTS,
     LET_GO,
-    OPENS,
     OVER,
-    RETREAT,
-    TOUCHES,
     UP,
     Primitive,
     PrimitiveFailed,
@@ -32,27 +29,17 @@ from ig2mj.planning.moves import (
     from_home,
     hand_path,
     hand_with,
-    quaternion,
-    rest,
-    travel,
-    turn_at,
     turning_point,
-    vector3,
 )
-from ig2mj.planning.opening import way_off
 from ig2mj.planning.opening_around import Tried, is_shut, open_into
 from ig2mj.planning.over_mouths import is_deep, over_mouth
-from ig2mj.planning.phases import Phase, Until
 from ig2mj.planning.spots import Spot, ends_down, grip_for, is_tipped, put_there, spots_for, spots_upon
 from ig2mj.planning.stances import stances
-from ig2mj.planning.steadying import is_thrown_over, past_hand, steadied
+from ig2mj.planning.steadying import is_thrown_over, steadied
 from ig2mj.planning.steps import Outcome, Step
 from ig2mj.planning.two_hands import place_with_both
 from ig2mj.planning.world import PlannedWorld, Rotation, Stance, Vector
 from ig2mj.sampling.conditions import Condition
-
-SPARE = 0.03
-"""m before its place from which on an object may touch what is around."""
 
 DEEP = 0.4
 """m above a spot in a container that is open above, from which an object is let down to it."""
@@ -65,11 +52,8 @@ TIGHT = 0.12
 
 DROPS = {"inside": DEEP_DROPS, "on_top": LOW_DROPS, "on_floor": LOW_DROPS, "next_to": LOW_DROPS, "under": (0.0,)}
 
-FALLS_OVER, FALLING = ("on_floor", "on_top", "inside"), 15
-"""Placements that stay true where an object falls over, and agent steps that it falls."""
-
-CLOSER = 0.005
-"""m by which a hand that is drawn back may come closer to what is around than it is."""
+FALLS_OVER = ("on_floor", "on_top", "inside")
+"""Placements that stay true where an object falls over."""
 
 UNDER = 0.85
 """m, horizontal, that the base of hands that float would like to be from what is put below something: it is let down
@@ -111,8 +95,9 @@ def place(predicate: str, until: str = "", turns_over: bool = True) -> Callable[
                 and is_graspable(world, where)
                 and is_tipped(world, where)
             ):
-                righted = True
-                if not (yield from with_free_hand(world, set_upright(world, where))) and name not in world.held:
+                righted = True  # an arm's only hand puts down what it holds for that
+                yield from with_free_hand(world, set_upright(world, where))
+                if name not in world.held:
                     continue
             hand = hand_with(world, name)
             found, also = yield from _find(world, predicate, step, hand, opened, until)
@@ -184,91 +169,6 @@ def _bring(
     if planned is None:
         return "no_path"
     return (yield from letting_go(world, name, hand, planned, falls=spot.drop > 0.0))
-
-
-def letting_go(
-    world: PlannedWorld, name: str, hand: int, planned: Letting, falls: bool
-) -> Generator[Program, str, str]:
-    """A hand brings what it holds where it lets it go, from where the robot stands, and goes back; returns why it did
-    not. Where what it has let go is in its way back, as the pocket of a bag above it, it first goes off that.
-
-    Args:
-      falls: it does not stand or lie there by itself.
-    """
-    start, way, target, quat, back = planned
-    keeps, turned = world.index(name), quaternion(quat)
-    waits = Phase(until=Until.WAITED, limit=FALLING if falls else 6)
-    reason = yield [
-        *turn_at(world, hand, start, turned, keeps),
-        *travel(hand, way, turned, keeps=keeps),
-        Phase(hand=hand, pos=vector3(target), quat=turned, keeps=keeps, tolerance=0.015, turn_tolerance=0.1, limit=20,
-              after="", speed=0.03),
-        Phase(hand=hand, close=False, until=Until.EMPTY, limit=10),
-        Phase(hand=hand, close=False, until=Until.WAITED, limit=OPENS),
-        Phase(hand=hand, pos=vector3(back), tolerance=0.04, limit=15, after=""),
-    ]  # fmt: skip
-    if reason:
-        return reason
-    returns = [*way[-2::-1], start]
-    if world.body.opening is None and _is_caught(world, name, hand, returns):
-        off = way_off(world, hand, among_walls=True)
-        if off:
-            return (yield [*off, waits])
-    return (yield [*travel(hand, returns, None), *rest(hand), waits])
-
-
-def _is_caught(world: PlannedWorld, name: str, hand: int, way: Sequence[Vector]) -> bool:
-    """Whether an object that a hand has let go is in the hand's way."""
-    own, grip = world.only(world.index(name)), world.grip(hand)
-    spheres = world.spheres(*world.hand_axes(hand)) * (1.0, 1.0, 1.0, TOUCHES)
-    spheres = spheres[own.distance(spheres[:, :3] + grip) > spheres[:, 3]]
-    return not all(straight(own, spheres, a, b) for a, b in itertools.pairwise([grip, *way]))
-
-
-Letting = tuple[Vector, list[Vector], Vector, Sequence[float] | np.ndarray, Vector]
-"""Where a hand turns what it holds, its way from there, where it lets go, its orientation there, and where it goes back
-to then."""
-
-
-def way_to_spot(world: PlannedWorld, name: str, hand: int, spot: Spot) -> Letting | None:
-    """How a hand brings what it holds to a spot from where the robot stands; None: it has no way."""
-    _, yaw = world.base
-    target, quat, rotation = grip_for(world, hand, name, spot)
-    fingers, palm = world.hand_axes(hand, rotation)
-    target = target + (LET_GO + spot.drop) * UP
-    spheres = _spheres(world, name, hand, spot)
-    obstacles = world.obstacles([name], world.stance)
-    if (other := 1 - hand) < len(world.held) and is_thrown_over(world, world.held[other]):  # which holds the container
-        obstacles = past_hand(world, obstacles, other)
-    start = turning_point(obstacles, spheres, world.grip(hand), yaw)
-    follows = world.follows(hand, quat, obstacles)
-    way = hand_path(obstacles, spheres, start, target, [UP, -ahead(yaw)], SPARE, True, follows, turns=True)
-    if way is None:
-        return None
-    return start, way, target, quat, _drawn_back(obstacles, world.spheres(fingers, palm), target, palm)
-
-
-def _spheres(world: PlannedWorld, name: str, hand: int, spot: Spot) -> Float[np.ndarray, "S 4"]:
-    """Spheres of a hand with an object, about its grasp point, with the object turned as it would be at a spot."""
-    _, _, rotation = grip_for(world, hand, name, spot)
-    found = world.spheres(*world.hand_axes(hand, rotation), holding=name, hand=hand, rotation=rotation)
-    return np.where((found[:, 3:] < HELD) & spot.tight, found * (1.0, 1.0, 1.0, TOUCHES), found)
-
-
-def _drawn_back(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], target: Vector, palm: Vector) -> Vector:
-    """Where a hand that has let go at `target` is drawn back to, off what it held: where it stays itself if it has less
-    room behind, as between the sides of a container, which it would press what it held against.
-
-    Args:
-      spheres: of the hand alone.
-    """
-
-    def room(point: Vector) -> float:
-        return float((obstacles.distance(spheres[:, :3] + point) - spheres[:, 3]).min())
-
-    least = min(room(target), 0.0) - CLOSER
-    backs = (target - share * RETREAT * palm for share in (1.0, 0.5, 0.25))
-    return next((back for back in backs if room(back) > least), target)
 
 
 def _find(
@@ -430,7 +330,7 @@ def _plan(
         later, last = [], []
         for spot in proposed:
             target, _, _ = grip_for(world, hand, name, spot)
-            spheres = _spheres(world, name, hand, spot)
+            spheres = spheres_at(world, name, hand, spot)
             lacking = _NO_WAY if lacking == _NO_SPOT else lacking
             drop = _drop(obstacles, spheres, target + LET_GO * UP, DROPS[predicate], TIGHT if spot.tight else OVER)
             if drop is None:
@@ -489,7 +389,7 @@ def _has_way(
     """Whether the hand has a way to a spot from a stance."""
     stance, spot = candidate
     target, quat, _ = grip_for(world, hand, name, spot)
-    spheres = _spheres(world, name, hand, spot)
+    spheres = spheres_at(world, name, hand, spot)
     back, standing = [UP, -ahead(stance.yaw)], world.standing(obstacles, stance, hand)
     start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
     follows = world.follows(hand, quat, standing, stance)

@@ -26,13 +26,13 @@ from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx.contacts import Contacts, larger_forces, no_forces, touching_units, without_ignored
 from ig2mj.engine.mjx.copying import MjxCopies
 from ig2mj.engine.mjx.execution import TracedExecution
-from ig2mj.engine.mjx.packed_rows import PackedRows
 from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, fresh, mujoco_of, uncommitted
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import after_release, apply_write, reaches, trees_joined, with_islands
 from ig2mj.engine.model_fields import MOVING, POSES, ModelFields, check_written, given, merged, own_fields
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE
+from ig2mj.engine.packed_rows import PackedRows
 from ig2mj.engine.scene_engine import SceneEngine
 from ig2mj.engine.snapshot import Snapshot, fitted, make_snapshot
 from ig2mj.engine.speed_limits import SpeedLimits
