@@ -4,9 +4,9 @@
     python -m benchmarks.planning.page --requests FILE   takes in rows of `ig2mj plan --benchmark --out FILE`
     python -m benchmarks.planning.page                   writes the page from what was taken in before
 
-What is taken in is one line for each activity in benchmarks/results/planning/<rung>.jsonl, one for each primitive in
-requests.jsonl, and one for each other agent or condition of physics and each commit in comparisons.jsonl next to them:
-other commits' comparisons are of other activities.
+What is taken in is one line for each activity in benchmarks/results/planning/<rung>.jsonl, or physics_<robot>.jsonl for
+another robot than the humanoid, one for each primitive in requests.jsonl, and one for each other agent or condition of
+physics and each commit in comparisons.jsonl next to them: other commits' comparisons are of other activities.
 """
 
 from __future__ import annotations
@@ -28,10 +28,16 @@ from ig2mj.planning.steps import PRIMITIVES, REASONS
 FOLDER = RESULTS / "planning"
 PAGE = ROOT / "docs" / "notes" / "planned_activities.md"
 REQUESTS, COMPARISONS = "requests.jsonl", "comparisons.jsonl"
+OTHER_ROBOTS = ("fetch",)
+"""Robots other than the humanoid whose rows in physics are shown activity by activity."""
+LANES = {rung: rung for rung in RUNGS} | {f"physics, {robot}": f"physics_{robot}" for robot in OTHER_ROBOTS}
+"""What has a column of the page, and the name of its file of results."""
 ENOUGH = 0.8
 """Share of starts with which an activity counts as solved."""
 SHOWN = 2
 """Reasons of failure in a row of the page."""
+LISTED = 4
+"""Activities of a command that are named on the page."""
 
 Row = dict[str, Any]
 
@@ -51,15 +57,18 @@ def main() -> None:
         files = [file for folder in args.rows if (file := folder / f"{rung}.jsonl").is_file()]
         if files:
             rows = read_rows(files)
-            main = [row for row in rows if not condition_of(row)]
-            if main:
-                take_in(main, args.results / f"{rung}.jsonl")
+            by_lane: dict[str, list[Row]] = {}
+            for row in rows:
+                by_lane.setdefault(lane_of(row, rung), []).append(row)
+            for lane, own in by_lane.items():
+                if lane:
+                    take_in(own, args.results / f"{LANES[lane]}.jsonl")
             if rung == "physics":
                 kept_main = read_lines(args.results / f"{rung}.jsonl")
-                take_in_comparisons([row for row in rows if condition_of(row)], kept_main, args.results / COMPARISONS)
+                take_in_comparisons(by_lane.get("", []), kept_main, args.results / COMPARISONS)
     if args.requests:
         take_in_requests([row for file in args.requests for row in read_lines(file)], args.results / REQUESTS)
-    kept = {rung: read_lines(args.results / f"{rung}.jsonl") for rung in RUNGS}
+    kept = {lane: read_lines(args.results / f"{file}.jsonl") for lane, file in LANES.items()}
     others = read_lines(args.results / REQUESTS), read_lines(args.results / COMPARISONS)
     args.page.write_text(page(kept, *others), encoding="utf-8")
     print(args.page)
@@ -138,6 +147,15 @@ def condition_of(row: Row) -> str:
     return " ".join(f"--{name} {value}" for name, value in found.items())
 
 
+def lane_of(row: Row, rung: str) -> str:
+    """The lane that a row belongs to; "" for one of another agent or condition."""
+    condition = condition_of(row)
+    if not condition:
+        return rung
+    lane = f"{rung}, {condition.removeprefix('--robot ')}"
+    return lane if lane in LANES else ""
+
+
 def take_in_comparisons(rows: Sequence[Row], main: Sequence[Row], file: pathlib.Path) -> None:
     """Replaces the lines of the rows' conditions at their commits. `main`: lines of the main rows, for those of the
     same starts."""
@@ -200,12 +218,12 @@ def page(kept: dict[str, list[Row]], requests: Sequence[Row] = (), comparisons: 
         "# BEHAVIOR's activities, planned and carried out",
         "",
         "Written by `python -m benchmarks.planning.page` from rows of `python -m benchmarks.planning.activities`;",
-        f"not by hand. Start states: split `{conditions.get('split')}`. Robot: {conditions.get('robot')}, with",
-        "assisted grasping and the simulator's state as observation. Doors between rooms that the goal does not name",
-        f"are {conditions.get('doors')} at the start. Native engine, one thread. An episode is *solved* if the goal",
-        "holds at its end; *q* is its partial credit ([planning](../guide/planning.md#results)). The rungs are",
-        "*symbolic* (states are set), *kinematic* (motion is planned and checked, states are set) and *physics* (the",
-        "robot acts).",
+        f"not by hand. Start states: split `{conditions.get('split')}`. Robot: {conditions.get('robot')}, where no",
+        "other is named, with assisted grasping and the simulator's state as observation. Doors between rooms that the",
+        f"goal does not name are {conditions.get('doors')} at the start. Native engine, one thread. An episode is",
+        "*solved* if the goal holds at its end; *q* is its partial credit ([planning](../guide/planning.md#results)).",
+        "The rungs are *symbolic* (states are set), *kinematic* (motion is planned and checked, states are set) and",
+        "*physics* (the robot acts).",
         "",
         "## Rungs",
         "",
@@ -216,8 +234,8 @@ def page(kept: dict[str, list[Row]], requests: Sequence[Row] = (), comparisons: 
         "## Activities",
         "",
         "Solved starts of all, and mean q. *steps*: of the first plan, median. *simulated*: seconds of an episode in",
-        "physics, median. *failures*: primitives that failed most often on the highest rung, with the reason and how",
-        "often, or why episodes ended.",
+        "physics, median. *failures*: primitives that failed most often on the highest rung of the humanoid, with the",
+        "reason and how often, or why episodes ended.",
         "",
         *_activities(kept),
         "",
@@ -303,6 +321,7 @@ def _activities(kept: dict[str, list[Row]]) -> list[str]:
     for name in names:
         lines = [by_rung[rung].get(name) for rung in kept]
         there = [line for line in lines if line is not None]
+        highest = next((by_rung[rung][name] for rung in reversed(RUNGS) if name in by_rung.get(rung, {})), there[-1])
         planned = [n for line in there for n in line["planned"] if n]
         cells = [name, next((x["home"] for x in there if x["home"]), "-")]
         cells.append(f"{statistics.median(planned):g}" if planned else "-")
@@ -313,7 +332,7 @@ def _activities(kept: dict[str, list[Row]]) -> list[str]:
                 cells += [f"{sum(line['success'])} of {len(line['success'])}", f"{statistics.mean(line['q']):.2f}"]
         physics = by_rung.get("physics", {}).get(name)
         times = [t for t in physics["time"] if t] if physics else []
-        cells += [f"{statistics.median(times):.0f}" if times else "-", _failures(there[-1])]
+        cells += [f"{statistics.median(times):.0f}" if times else "-", _failures(highest)]
         rows.append(cells)
     return table(head, rows)
 
@@ -405,10 +424,18 @@ def _provenance(kept: dict[str, list[Row]], requests: Sequence[Row]) -> list[str
     for rung, lines in kept.items():
         for key in ("commits", "commands", "dates"):
             found = sorted({value for line in lines for value in line[key]})
+            found = sorted({_short(value) for value in found}) if key == "commands" else found
             rows.append((rung, key, ", ".join(f"`{value}`" for value in found)))
         versions = sorted({f"{name} {value}" for line in lines for name, value in line["versions"].items()})
         rows.append((rung, "versions", ", ".join(versions)))
     return table(("rung", "of the rows", ""), rows)
+
+
+def _short(command: str) -> str:
+    """A command of the activities' rows, with the number of activities in place of a long list of them."""
+    before, option, names = command.partition(" --activities ")
+    count = len(names.split())
+    return command if count <= LISTED else f"{before}{option}({count} names)"
 
 
 if __name__ == "__main__":

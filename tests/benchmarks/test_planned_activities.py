@@ -97,3 +97,30 @@ def test_other_agents_are_compared_on_the_same_starts_and_leave_the_main_rows_al
     pages.take_in_comparisons(again, main, tmp_path / "comparisons.jsonl")
     lines = pages.read_lines(tmp_path / "comparisons.jsonl")
     assert sorted((x["commits"], x["starts"]) for x in lines) == sorted([([commit], 3), (["0abcdef0"], 2)])
+
+
+def test_another_robot_has_rows_and_columns_of_its_own_and_its_comparisons_stay_apart(arguments, tmp_path, monkeypatch):
+    arguments.doors, arguments.robot = "open", "humanoid"
+    run(arguments)
+    arguments.robot = "fetch"
+    run(arguments)
+    arguments.doors = "shut"
+    rows = list(read_rows([arguments.out / "physics.jsonl"]))
+    run(arguments)
+    assert {pages.lane_of(row, "physics") for row in rows} == {"physics", "physics, fetch"}
+    shut = [row for row in read_rows([arguments.out / "physics.jsonl"]) if row["conditions"]["doors"] == "shut"]
+    assert {pages.lane_of(row, "physics") for row in shut} == {""}
+    results, page = tmp_path / "results", tmp_path / "page.md"
+    told = ["page", "--rows", str(arguments.out), "--results", str(results), "--page", str(page)]
+    monkeypatch.setattr("sys.argv", told)
+    pages.main()
+    assert {file.name for file in results.iterdir()} == {"physics.jsonl", "physics_fetch.jsonl", "comparisons.jsonl"}
+    text = page.read_text()
+    assert "| making_tea | fir | 1 | 3 of 3 | 1.00 | 3 of 3 | 1.00 | 2 |  |" in text
+    assert "| `--robot fetch --doors shut` |" in text
+
+
+def test_a_long_list_of_activities_is_counted():
+    command = "python -m benchmarks.planning.activities --out plan --activities"
+    assert pages._short(f"{command} a b") == f"{command} a b"
+    assert pages._short(f"{command} a b c d e") == f"{command} (5 names)"
