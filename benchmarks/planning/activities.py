@@ -67,11 +67,16 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=1800.0, help="wall time of an episode")
     parser.add_argument("--silence", type=float, default=900.0, help="seconds without a step that end a process")
+    parser.add_argument("--record", type=pathlib.Path, metavar="FOLDER", help="of recordings of episodes in physics")
     parser.add_argument("--again", action="store_true", help="repeat starts at which a process crashed or was ended")
     parser.add_argument("--until", type=float, default=float("inf"), help="seconds after which nothing is begun")
     args = parser.parse_args()
     names = args.activities or sorted(sampled_homes(RESULTS / "starts"))
     args.out.mkdir(parents=True, exist_ok=True)
+    if args.record is not None:
+        if args.rung != "physics":
+            parser.error("--record is of episodes in physics (--rung physics)")
+        args.record.mkdir(parents=True, exist_ok=True)
     run = _Run(args, names)
     try:
         run.all()
@@ -191,6 +196,7 @@ class _Run:
         """What a process reports."""
         args = self.args
         options = [f"--{name}={value}" for name, value in self.conditions.items()]
+        options += [f"--record={args.record.resolve()}"] if args.record is not None else []
         command = [sys.executable, *module("planning.worker"), job.activity, "--child", *options]
         log = self.logs / f"{job.activity}.{args.rung}.txt"
         for told in reports([*command, f"--seconds={args.seconds}", *arguments], lambda: args.silence, log, cwd=ROOT):

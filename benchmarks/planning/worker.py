@@ -8,6 +8,7 @@ Without `--starts` it samples the activity's start states, which are kept (`Prob
 from __future__ import annotations
 
 import argparse
+import pathlib
 import time
 import traceback
 import warnings
@@ -54,6 +55,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=float("inf"), help="wall time of an episode")
     add_conditions(parser)
+    parser.add_argument("--record", type=pathlib.Path, metavar="FOLDER", help="of recordings of episodes in physics")
     parser.add_argument("--child", action="store_true", help="end with the process that started this one")
     args = parser.parse_args()
     if args.child:
@@ -155,9 +157,14 @@ def episodes(
         report(event="begin", start=at)
 
     options = {"robot": args.robot, "split": args.split, "seed": args.seed, "doors_open": args.doors == "open"}
-    options["grasping"] = args.grasping
+    options |= {"grasping": args.grasping, "record": recording_of(args, numbers)}
     with Episodes(problem, planner, numbers, **options) as found:
         yield from found.solve(seconds=args.seconds, watch=watch, begun=begun)
+
+
+def recording_of(args: argparse.Namespace, numbers: Sequence[int]) -> pathlib.Path | None:
+    """File of a recording of starts; None: they are not recorded."""
+    return args.record and args.record / f"{args.activity}_{numbers[0]}.h5"
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ STEP = {"primitive": "open", "arguments": ["fridge_0"], "reason": "", "detail": 
 @pytest.fixture
 def arguments(tmp_path):
     options = dict.fromkeys(CONDITIONS, "x") | {"rung": "physics", "again": False, "until": float("inf")}
-    return argparse.Namespace(**options, starts=3, jobs=1, out=tmp_path)
+    return argparse.Namespace(**options, starts=3, jobs=1, out=tmp_path, record=None)
 
 
 def run(arguments, crashes=()):

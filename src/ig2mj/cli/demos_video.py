@@ -47,6 +47,7 @@ def gallery(
     files: Annotated[tuple[pathlib.Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FILE|FOLDER")],
     out: pathlib.Path,
     images: pathlib.Path | None = None,
+    jobs: int = 1,
 ) -> int:
     """Write a page with a strip of images for each recording of a plan that succeeds.
 
@@ -54,6 +55,7 @@ def gallery(
       files: recordings, or folders of them.
       out: the page, a Markdown file.
       images: folder of the strips; default: images/gallery next to the page.
+      jobs: processes that render, each with a home in memory.
     """
     from ig2mj.cli.common.files import check_output
     from ig2mj.cli.demos_folder import files_of
@@ -61,11 +63,13 @@ def gallery(
     from ig2mj.process.progress import progress
     from ig2mj.showcase.recorded_plan import write_gallery
 
+    if jobs < 1:
+        raise Ig2mjError("--jobs is at least 1")
     if not files:
         raise Ig2mjError("name recordings, or folders of them (`ig2mj solve ACTIVITY --record FILE`)")
     check_output(out)
     found = [one for file in files for one in files_of(file)]
     with progress("rendering strips") as report:
-        count = write_gallery(found, out, images or out.parent / "images" / "gallery", report)
+        count = write_gallery(found, out, images or out.parent / "images" / "gallery", report, jobs=jobs)
     print(f"{out}: {count} of {len(found)} recordings have a success")
     return 0 if count else 1

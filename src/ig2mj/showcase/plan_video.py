@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import UInt8
@@ -19,6 +19,9 @@ from ig2mj.viewer.video import VideoWriter
 
 SPEED, FRAMES_PER_SECOND = 3.0, 15.0
 """Times real time, and 1/s, of videos."""
+
+MARGIN = 8
+"""Pixels around words."""
 
 LAST = 1.0
 """s for which the last image stays."""
@@ -70,7 +73,7 @@ class PlanVideo:
             return
         pixels = self._view(state, camera=lambda model, data: self._camera(model, data, objects))
         seconds = float(np.asarray(state.info["steps"])[self._world]) * self._env.period
-        self._last = self._captioned(pixels, "   ".join(part for part in (words, f"{seconds:.0f} s") if part))
+        self._last = self._captioned(pixels, ", ".join(part for part in (words, f"{seconds:.0f}\u00a0s") if part))
         self._video.add(self._last)
 
     def close(self) -> None:
@@ -84,5 +87,19 @@ class PlanVideo:
         from PIL import Image, ImageDraw
 
         image = Image.fromarray(pixels)
-        caption_at(ImageDraw.Draw(image), (8, self._size[1] - round(self._size[1] / 15)), words, self._letters)
+        draw = ImageDraw.Draw(image)
+        text = wrapped(words, self._size[0] - 2 * MARGIN, lambda line: draw.textlength(line, self._letters))
+        below = draw.multiline_textbbox((0, 0), text, self._letters, stroke_width=2)[3]
+        caption_at(draw, (MARGIN, round(self._size[1] - MARGIN / 2 - below)), text, self._letters)
         return np.asarray(image)
+
+
+def wrapped(text: str, width: int, length: Callable[[str], float]) -> str:
+    """Text in lines, broken at its spaces. `width`: of a line, in pixels. `length`: that of a text."""
+    lines: list[str] = []
+    for word in text.split(" "):
+        if lines and length(f"{lines[-1]} {word}") <= width:
+            lines[-1] += f" {word}"
+        else:
+            lines.append(word)
+    return "\n".join(lines)

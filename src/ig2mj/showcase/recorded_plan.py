@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
 import pathlib
@@ -16,6 +17,7 @@ from ig2mj.demos.replay import Replayer
 from ig2mj.demos.solving import PLAN
 from ig2mj.errors import InputError
 from ig2mj.files.content import decode_json
+from ig2mj.process.spawning import worker_processes
 from ig2mj.showcase.film_strip import ENDINGS
 from ig2mj.showcase.plan_video import PlanVideo
 from ig2mj.tasks.own_goal import split_goal_name
@@ -97,8 +99,7 @@ def write_video(
     env, world, last = replayer.env, chosen.world, chosen.frames - 1
     size = size or (STRIP_SIZE if strip else (640, 480))
     if strip:
-        ends = [0, *(min(step.end, last) for step in plan.steps)]
-        wanted = [ends[k] for k in np.linspace(0, len(ends) - 1, STRIP_FRAMES).round().astype(int)]
+        wanted = strip_frames([0, *(min(step.end, last) for step in plan.steps)])
     else:
         wanted = list(dict.fromkeys([*range(0, last + 1, max(1, round(speed / rate / env.period))), last]))
     video = PlanVideo(file, env, world, speed=speed, rate=rate, size=size, frames=STRIP_FRAMES if strip else 0)
@@ -115,40 +116,62 @@ def write_video(
     return plan
 
 
+def strip_frames(ends: Sequence[int], count: int = STRIP_FRAMES) -> list[int]:
+    """Frames of a strip: the first and the last one, and ends of steps that are spread evenly; where there are too few
+    steps, frames in the middle of the longest gaps, too. `ends`: the first frame and those at which steps end."""
+    found = sorted(set(ends))
+    while 1 < len(found) < count and max(gaps := np.diff(found)) > 1:
+        at = int(np.argmax(gaps))
+        found.insert(at + 1, (found[at] + found[at + 1]) // 2)
+    return [found[k] for k in np.linspace(0, len(found) - 1, count).round().astype(int)]
+
+
 def write_gallery(
-    files: Sequence[pathlib.Path], page: pathlib.Path, images: pathlib.Path, progress: ProgressCallback = no_progress
+    files: Sequence[pathlib.Path],
+    page: pathlib.Path,
+    images: pathlib.Path,
+    progress: ProgressCallback = no_progress,
+    *,
+    jobs: int = 1,
 ) -> int:
     """Writes a page with one strip of images for each recording that has a success; the number of strips.
 
     Args:
       page: Markdown file. images: folder of the strips, made if it is missing.
+      jobs: processes that render, each with a home in memory.
 
     Raises:
       InputError: a recording is broken.
     """
     images.mkdir(parents=True, exist_ok=True)
+    targets = [(file, images / f"{file.stem}.jpg", page.parent) for file in files]
     parts = []
-    for k, file in enumerate(files):
-        progress(k, len(files), file.name)
-        with Recording(file) as recording:
-            if not any(run.success and PLAN in run.attributes for run in recording.runs):
-                continue
-            image = images / f"{file.stem}.jpg"
-            plan = write_video(recording, image)
-            task, home = str(recording.header.get("task", "")), str(recording.header.get("scene", ""))
-        own = split_goal_name(task)
-        title = "A goal in a home" if own else task.removeprefix("activity/").replace("_", " ").capitalize()
-        goal = f"`{own[1]}`\n\n" if own else ""
-        about = f"Home {home}, {len(plan.steps)} primitives, {plan.seconds:.0f} s of simulated time."
-        where = os.path.relpath(image, page.parent)
-        parts.append(f"## {title}\n\n{about}\n\n{goal}![{title}]({where})\n")
+    with worker_processes(jobs) if jobs > 1 else contextlib.nullcontext() as pool:
+        sections = pool.map(_section, *zip(*targets, strict=True)) if pool else (_section(*one) for one in targets)
+        for k, section in enumerate(sections):
+            progress(k + 1, len(files), files[k].name)
+            parts += [section] if section else []
     page.write_text("\n".join([_HEAD, *sorted(parts)]), encoding="utf-8")
     return len(parts)
 
 
+def _section(file: pathlib.Path, image: pathlib.Path, folder: pathlib.Path) -> str:
+    """The section of a recording on a page in a folder, and its strip; "" where no run of a plan succeeds."""
+    with Recording(file) as recording:
+        if not any(run.success and PLAN in run.attributes for run in recording.runs):
+            return ""
+        plan = write_video(recording, image)
+        task, home = str(recording.header.get("task", "")), str(recording.header.get("scene", ""))
+    own = split_goal_name(task)
+    title = "A goal in a home" if own else task.removeprefix("activity/").replace("_", " ").capitalize()
+    goal = f"`{own[1]}`\n\n" if own else ""
+    about = f"Home {home}, {len(plan.steps)} primitives, {plan.seconds:.0f} s of simulated time."
+    return f"## {title}\n\n{about}\n\n{goal}![{title}]({os.path.relpath(image, folder)})\n"
+
+
 _HEAD = """# Gallery of solved activities
 
-The humanoid carries these out in physics, by the planner ([planning](guide/planning.md)). Each strip
-has the start and the ends of primitives of one recorded episode, which replays bit for bit.
+The humanoid carries these out in physics, by the planner ([planning](guide/planning.md)). A strip
+has five moments of one recorded episode, from its start to its end; ends of primitives first.
 `ig2mj demos gallery RECORDINGS --out docs/gallery.md` makes this page.
 """
