@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ig2mj.planning.clearance import Obstacles
-from ig2mj.planning.pinches import BITE, SHALLOW, between_fingers, holds, over_edges
+from ig2mj.planning.pinches import BITE, SHALLOW, around_corners, between_fingers, holds, over_edges
 
 OPENING, TIP, THICK = 0.1, 0.03, 0.013
 
@@ -52,6 +52,22 @@ def test_what_is_wider_than_the_fingers_open_is_taken_by_an_edge_of_any_side(hei
     assert holds(corners_of_fingers, OPENING, box, points, fingers, palms).all()
     assert not holds(corners_of_fingers, OPENING, box, points - 0.1 * fingers, fingers, palms).any()
     assert not holds(corners_of_fingers, OPENING, box, points - 0.08 * palms, fingers, palms).any()
+
+
+def test_a_sheet_is_taken_by_its_corners_with_a_side_of_the_fingers_on_the_floor():
+    sheet = Box(0.14, 0.18, 0.003)
+    points, fingers, palms = around_corners(corners_of_fingers, OPENING, sheet, sheet.corners)
+    assert {tuple(np.sign(p[:2])) for p in points} == {(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)}
+    for point, finger, palm in zip(points, fingers, palms, strict=True):
+        hand = corners_of_fingers(finger, palm) + point
+        tips = hand[np.argsort(hand[:, 2])[:4]]  # the lowest corners of both fingers, inner and outer ones
+        assert np.allclose(tips[:, 2], 0.0, atol=1e-6) and sheet.distance(hand).min() > 0.0
+        right, left = (tips[(tips - point) @ finger * s > 0].mean(0) for s in (-1, 1))
+        between = right + np.linspace(0.0, 1.0, 50)[:, None] * (left - right) + [0.0, 0.0, 0.002]
+        assert (sheet.distance(between) < 0.0).any()
+        assert palm[2] > -0.5  # almost level
+    thick = Box(0.14, 0.18, 0.012)
+    assert not len(around_corners(corners_of_fingers, OPENING, thick, thick.corners)[0])
 
 
 def test_between_the_fingers_is_what_is_thinner_than_they_bite():

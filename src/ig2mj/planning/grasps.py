@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.planning.bodies import HandedBody
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.moves import BELOW
-from ig2mj.planning.pinches import SHALLOW, between_fingers, holds, over_edges
+from ig2mj.planning.pinches import SHALLOW, around_corners, between_fingers, holds, over_edges
 from ig2mj.planning.world import PlannedWorld, Vector
 from ig2mj.scene.tables import SceneTables
 
@@ -284,7 +284,8 @@ def _of_gripper(
     good = holds(body.hand_corners, opening, own, higher, fingers[which[tips]], palms[which[tips]])
     deep = np.repeat([BELOW, TIPS], [len(which), good.sum()])
     which, at = np.concatenate([which, which[tips[good]]]), np.concatenate([at, higher[good]])
-    edge, edge_fingers, edge_palms = over_edges(body.hand_corners, opening, own, corners)
+    kinds = (take(body.hand_corners, opening, own, corners) for take in (over_edges, around_corners))
+    edge, edge_fingers, edge_palms = (np.concatenate(parts) for parts in zip(*kinds, strict=True))
     return (
         np.concatenate([which, len(points) + np.arange(len(edge))]),
         np.concatenate([at, edge]),

@@ -2,7 +2,9 @@
 
 A gripper with assisted grasping holds what a finger presses on and a ray from one finger to the other meets. What is
 wider than the fingers open, and so thin that no finger gets below it, as a cloth or a book that lies flat, is taken by
-an edge: one finger stands next to it, the other, raised by a tilt of the gripper, is above it.
+an edge: one finger stands next to it, the other, raised by a tilt of the gripper, is above it. A sheet of a few
+millimetres, above which all rays of such a gripper pass, is taken by a corner: the gripper points almost level, with a
+side of both fingers on what the sheet lies on, so that rays from these sides meet the corner between them.
 
 Axes: N, M poses, V corners.
 """
@@ -33,6 +35,10 @@ away from its middle, too."""
 
 THIRDS = (0.0, 1 / 3, -1 / 3)
 """Parts of a long edge at which it is taken, from its middle."""
+
+SHEET, INTO, SLANTS = 0.008, 0.02, (0.3, 0.45)
+"""m of height up to which an object is taken by its corners, m from such a corner to the fingertips on both sides of
+it, and rad by which the gripper points down there."""
 
 ENTERED = 0.004
 """m by which a finger over an edge may seem to enter the object."""
@@ -104,6 +110,39 @@ def over_edges(
     points, fingers, palms = np.array(points), np.array(fingers), np.array(palms)
     held = holds(gripper, opening, own, points, fingers, palms)
     return points[held], fingers[held], palms[held]
+
+
+def around_corners(
+    gripper: Corners, opening: float, own: Obstacles, corners: Float[np.ndarray, "V 3"]
+) -> tuple[Float[np.ndarray, "M 3"], Float[np.ndarray, "M 3"], Float[np.ndarray, "M 3"]]:
+    """Grasp points of a gripper whose fingers are on both sides of a corner of a thin object that lies flat, and on
+    what it lies on, directions between the fingers, and those in which it points.
+
+    Args:
+      opening: m between the fingers. own: the object alone. corners: its own.
+    """
+    points, fingers, palms = [], [], []
+    bottom, height = float(corners[:, 2].min()), float(np.ptp(corners[:, 2]))
+    along = np.linspace(-opening / 2, opening / 2, SLICES)
+    for angle in np.arange(OUTWARD) * (2 * np.pi / OUTWARD) if height < SHEET else ():
+        out = np.array([np.cos(angle), np.sin(angle), 0.0])
+        across, outermost = np.cross(UP, out), float((corners @ out).max())
+        tip = corners[corners @ out > outermost - INTO / 2] @ across
+        inner = (outermost - INTO) * out + (tip.min() + tip.max()) / 2 * across + (bottom + height / 2) * UP
+        inside = along[own.distance(inner + along[:, None] * across) < 0.0]
+        if not len(inside) or np.ptp(inside) > opening - 2 * SPARE_OPENING:
+            continue
+        inner = inner + (inside.min() + inside.max()) / 2 * across
+        for slant in SLANTS:
+            palm = -np.cos(slant) * out - np.sin(slant) * UP
+            hand = gripper(across, palm)
+            lowest = hand[hand[:, 2] < hand[:, 2].min() + ENTERED].mean(0)
+            at = inner - (lowest @ out) * out
+            at[2] = bottom - float(hand[:, 2].min())
+            points.append(at)
+            fingers.append(across)
+            palms.append(palm)
+    return np.array(points).reshape(-1, 3), np.array(fingers).reshape(-1, 3), np.array(palms).reshape(-1, 3)
 
 
 def holds(
