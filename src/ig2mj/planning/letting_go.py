@@ -97,10 +97,17 @@ def way_to_spot(world: PlannedWorld, name: str, hand: int, spot: Spot) -> Lettin
         obstacles = past_hand(world, obstacles, other)
     start = turning_point(obstacles, spheres, world.grip(hand), yaw)
     follows = world.follows(hand, quat, obstacles)
-    way = hand_path(obstacles, spheres, start, target, [UP, -ahead(yaw)], SPARE, True, follows, turns=True)
+    way = hand_path(obstacles, spheres, start, target, entries_to(spot, yaw), SPARE, True, follows, turns=True)
     if way is None:
         return None
     return start, way, target, quat, drawn_back(obstacles, world.spheres(fingers, palm), target, palm)
+
+
+def entries_to(spot: Spot, yaw: float) -> list[Vector]:
+    """Directions from which a hand of a robot that looks along `yaw` (rad) may come to a spot with what it holds: from
+    above, from the robot, and past the sides that look to the robot of what the spot is under."""
+    back = -ahead(yaw)
+    return [UP, back, *(out for out in spot.outs if out @ back > 0.0)]
 
 
 def spheres_at(world: PlannedWorld, name: str, hand: int, spot: Spot) -> Float[np.ndarray, "S 4"]:

@@ -15,7 +15,7 @@ from ig2mj.planning.arm_orientations import points_ahead
 from ig2mj.planning.clearance import HELD, Obstacles, straight
 from ig2mj.planning.driving import go, nearer
 from ig2mj.planning.grasping import grasp, is_graspable, put_down_others, release, with_free_hand
-from ig2mj.planning.letting_go import SPARE, letting_go, spheres_at, way_to_spot
+from ig2mj.planning.letting_go import SPARE, entries_to, letting_go, spheres_at, way_to_spot
 from ig2mj.planning.moves import (
     ATTEMPTS,
     LET_GO,
@@ -24,7 +24,6 @@ from ig2mj.planning.moves import (
     Primitive,
     PrimitiveFailed,
     Program,
-    ahead,
     first_way,
     from_home,
     hand_path,
@@ -390,7 +389,7 @@ def _has_way(
     stance, spot = candidate
     target, quat, _ = grip_for(world, hand, name, spot)
     spheres = spheres_at(world, name, hand, spot)
-    back, standing = [UP, -ahead(stance.yaw)], world.standing(obstacles, stance, hand)
+    back, standing = entries_to(spot, stance.yaw), world.standing(obstacles, stance, hand)
     start = turning_point(standing, spheres, world.carried(hand, stance), stance.yaw)
     follows = world.follows(hand, quat, standing, stance)
     goal = target + (LET_GO + spot.drop) * UP

@@ -75,13 +75,14 @@ UP = np.array([0.0, 0.0, 1.0])
 class Spot:
     """Where an object is to be: position (m) and orientation (w-x-y-z) of its main body, world frame; `roofed`: inside
     something, with a part of it above; `drop`: m above it at which the hand lets go; `tight`: it touches the sides on
-    its way down."""
+    its way down; `outs`: horizontal directions out from below what it is under, for a hand on an arm."""
 
     pos: Vector
     quat: Float[np.ndarray, "4"]
     roofed: bool = False
     drop: float = 0.0
     tight: bool = False
+    outs: tuple[Vector, ...] = ()
 
 
 def spots_for(
@@ -113,6 +114,7 @@ def spots_for(
         openable_joints(world.stage.scene, world.view, world.index(where), world.world) if predicate == "inside" else []
     )
     drawers = [j for j in own if not j.hinge]
+    outs = out_from(world, where) if predicate == "under" and world.body.opening is not None else ()
     around = world.obstacles([name], stays=False)
     wide = max(CORNER, WIDE * float(np.sort(np.ptp(world.vertices(name), axis=0))[1]) / 2)
     orientations = _upright(world, name, flat, every=predicate == "inside")
@@ -146,9 +148,18 @@ def spots_for(
                 if not without_contact or _would_hold(world, without_contact, name, at, turn):
                     found.append(positions[k])
                     proposed += 1
-                    yield Spot(at, turn, bool(roofed[k]))
+                    yield Spot(at, turn, bool(roofed[k]), outs=outs)
             if found:
                 break
+
+
+def out_from(world: PlannedWorld, where: str) -> tuple[Vector, ...]:
+    """Horizontal directions of the sides of an object."""
+    frame = matrices_on_host(world.pose(where)[1][None])[0]
+    ahead = frame[:, int(np.argmin(np.abs(frame[2])))] * (1.0, 1.0, 0.0)
+    ahead = ahead / np.linalg.norm(ahead)
+    aside = np.cross(UP, ahead)
+    return ahead, -ahead, aside, -aside
 
 
 def _sampled(placer: Placer, *arguments: Any) -> Float[np.ndarray, "n 3"]:
