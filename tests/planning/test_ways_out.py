@@ -10,7 +10,7 @@ from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.free_floor import POCKET, FreeFloor
 from ig2mj.planning.grasping import _off_furniture, off_others_things
 from ig2mj.planning.letting_go import drawn_back
-from ig2mj.planning.moves import RETREAT, SLACK, _as_close
+from ig2mj.planning.moves import RETREAT, SLACK, as_close
 from ig2mj.planning.occupancy import RESOLUTION, Occupancy
 from ig2mj.planning.phases import Until
 from ig2mj.planning.placing import DEEP_DROPS, _drop
@@ -189,6 +189,6 @@ class _Wall(Obstacles):
 
 def test_what_is_close_to_a_wall_comes_no_closer_and_what_is_in_it_does_not_count():
     spheres = np.array([[0.0, 0.0, 0.0, 0.05], [-0.03, 0.0, 0.0, 0.05], [0.04, 0.0, 0.0, 0.05], [-0.2, 0.0, 0.0, 0.05]])
-    found = _as_close(_Wall(), spheres, np.array([-0.02, 0.0, 0.0]))
+    found = as_close(_Wall(), spheres, np.array([-0.02, 0.0, 0.0]))
     assert found[:, :3].tolist() == spheres[[0, 1, 3], :3].tolist()
     assert np.allclose(found[:, 3], [0.02 - SLACK, 0.05 - SLACK, 0.05])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
@@ -10,7 +11,7 @@ import numpy as np
 
 from ig2mj.planning.cleaning_area import is_behind, leaves_free
 from ig2mj.planning.clearance import Obstacles, straight
-from ig2mj.planning.drawing_out import drawn_out, has_room
+from ig2mj.planning.drawing_out import drawn_out, has_room, led_out
 from ig2mj.planning.driving import go, nearer
 from ig2mj.planning.free_floor import NEAR_START, FreeFloor
 from ig2mj.planning.grasps import AT_OBJECT, GraspPose, grasp_poses, ordered
@@ -262,15 +263,17 @@ def _take(
         *_making_room(world, name, hand),
         carries,
     ]  # fmt: skip
-    if world.body.opening is not None:
-        reason = yield [*takes, *leaves]
-    else:
-        reason = yield takes
-        if not reason and name in world.held:
-            carries = carry(world, hand, keeps=index)
-            ends = [start + lift, *points, world.carried(hand, world.stance)]
-            out = None if has_room(world, name, hand, ends) else drawn_out(world, name, hand, carries)
-            reason = yield [*leaves[:-1], carries] if out is None else [*_making_room(world, name, hand), *out]
+    reason = yield takes
+    if world.body.opening is not None and not reason and name in world.held:
+        ends = [start + lift, *points, world.carried(hand, world.stance)]
+        out = yield from led_out(world, name, hand, ends, carries)
+        turning = [dataclasses.replace(p, quat=None if p.in_body else turned) for p in leaves]
+        reason = (yield turning) if out is None else out
+    elif not reason and name in world.held:
+        carries = carry(world, hand, keeps=index)
+        ends = [start + lift, *points, world.carried(hand, world.stance)]
+        out = None if has_room(world, name, hand, ends) else drawn_out(world, name, hand, carries)
+        reason = yield [*leaves[:-1], carries] if out is None else [*_making_room(world, name, hand), *out]
     if name in world.held:
         return "", ""
     back = vector3(world.grip(hand) - pose.before * pose.palm)

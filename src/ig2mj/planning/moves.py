@@ -304,14 +304,14 @@ def way_home(world: PlannedWorld, hand: int, name: str, moved: Vector | None = N
     for share in (1.0, TOUCHES):
         there = spheres * (1.0, 1.0, 1.0, share)
         if moved is not None:
-            there = _as_close(obstacles, there, grip - off)
+            there = as_close(obstacles, there, grip - off)
         way = hand_path(obstacles, there, start, grip, back, search=obstacles.clear(there + np.array([*grip, 0.0])))
         if way is not None:
             return way[-2::-1]
     return None
 
 
-def _as_close(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], point: Vector) -> Float[np.ndarray, "n 4"]:
+def as_close(obstacles: Obstacles, spheres: Float[np.ndarray, "S 4"], point: Vector) -> Float[np.ndarray, "n 4"]:
     """Spheres that may come as close to what is around as they are now, with a hand at a point (m), and no closer;
     without those whose middles are in something."""
     room = obstacles.distance(spheres[:, :3] + point)
