@@ -414,11 +414,11 @@ def release(world: PlannedWorld, step: Step) -> Primitive:
     hand = hand_with(world, name)
     if holds_with_both(world, name):
         return (yield from release_with_both(world, name))
-    lowered = _lowered(world, name, hand) if not world.domain.fixed(name) else []
-    at = world.grip(hand) if not lowered or lowered[-1].pos is None else np.array(lowered[-1].pos)
+    down = lowered(world, name, hand) if not world.domain.fixed(name) else []
+    at = world.grip(hand) if not down or down[-1].pos is None else np.array(down[-1].pos)
     off = vector3(at - RETREAT * world.hand_axes(hand)[1])
     reason = yield [
-        *lowered,
+        *down,
         Phase(hand=hand, close=False, until=Until.EMPTY, limit=15),
         Phase(hand=hand, close=False, until=Until.WAITED, limit=OPENS),
         Phase(hand=hand, pos=off, tolerance=0.04, limit=15, after=""),
@@ -433,7 +433,7 @@ def put_down_others(world: PlannedWorld, name: str) -> Generator[Program, str, N
         yield from release(world, Step("release", (other,)))
 
 
-def _lowered(world: PlannedWorld, name: str, hand: int) -> Program:
+def lowered(world: PlannedWorld, name: str, hand: int) -> Program:
     """The hand goes straight down until what it holds is right above what is below it, or as far as it reaches."""
     obstacles, grip = world.obstacles([name], world.stance), world.grip(hand)
     spheres = world.spheres(*world.hand_axes(hand), holding=name, hand=hand)

@@ -13,11 +13,16 @@ import numpy as np
 
 from ig2mj.geometry.host_rotations import about_vertical, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.planning.grasping import grasp, is_graspable, release
+from ig2mj.planning.clearance import Obstacles
+from ig2mj.planning.driving import shift
+from ig2mj.planning.grasping import grasp, is_graspable, lowered, release
 from ig2mj.planning.joints import OPEN_TO, OpenableJoint, about
-from ig2mj.planning.moves import UP, Program, ahead, vector3
+from ig2mj.planning.moves import TOUCHES, UP, Program, ahead, vector3
+from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.opening import joints_of
 from ig2mj.planning.phases import Phase, Until
+from ig2mj.planning.placing import place
+from ig2mj.planning.stances import clear_with_held
 from ig2mj.planning.steps import Step
 from ig2mj.planning.world import HELD_MARGIN, PlannedWorld, Rotation, Vector
 
@@ -29,6 +34,13 @@ SINKS = 0.2
 
 OFFSETS = tuple(itertools.product((0.0, 0.15), (0.0, 0.2, -0.2), (0.0, 0.15, -0.15)))
 """m ahead, to the side and up from where a box is carried at which it is turned."""
+
+BACK, BACK_LIMIT, SPACING = np.arange(0.1, 1.25, 0.1), 100, 0.1
+"""m that the base goes back to where there is room for the turns; agent steps that it has for that; and m between the
+points at which it is looked whether there is room."""
+
+DROP = 0.15
+"""m that a box may fall when it is let go: from higher, it falls over."""
 
 TURNING, TURNED = 100, 0.15
 """Agent steps of a turn, at most, and rad within which it is done."""
@@ -51,6 +63,9 @@ def hung_open(world: PlannedWorld, name: str) -> Generator[Program, str, None]:
     if name not in world.held and (all(world.held) or not (yield from grasp(world, Step("grasp", (name,)))).done):
         return
     hand, index = world.held.index(name), world.index(name)
+    yield from _where_there_is_room(world, name, hand)
+    if name not in world.held:
+        return
     if (found := _hanging(world, name, hand)) is not None:
         turns = _turned(world, hand, index, *found)
         held = dataclasses.replace(turns, until=Until.WAITED, limit=LOOK)
@@ -64,8 +79,44 @@ def hung_open(world: PlannedWorld, name: str) -> Generator[Program, str, None]:
             lost = yield [held]
     if name in world.held and (stands := _standing(world, name, hand)) is not None:
         yield [_turned(world, hand, index, *stands)]
+    if name in world.held and _drop(world, name, hand) > DROP:
+        room = world.facts.room(name)
+        yield from place("on_floor", turns_over=False)(world, Step("place_on_floor", (name, room)))
     if name in world.held:
         yield from release(world, Step("release", (name,)))
+
+
+def _where_there_is_room(world: PlannedWorld, name: str, hand: int) -> Generator[Program, str, None]:
+    """The base goes straight back to where what a hand carries has room all around and down to the floor, or the most:
+    on its turns it comes to where it is neither before nor after them, and it is let down there."""
+    floor, now, obstacles = world.floor(), world.stance, world.obstacles([name])
+    grip, far = world.carried(hand, now), float(np.linalg.norm(world.points(name) - world.grip(hand), axis=1).max())
+    behind = [now]
+    for apart in BACK:
+        x, y = np.array(now.xy) - apart * ahead(now.yaw)[:2]
+        there = dataclasses.replace(now, xy=(float(x), float(y)))
+        if floor.nearest(there.xy, RESOLUTION) is None or not clear_with_held(world, [there], TOUCHES):
+            break
+        behind.append(there)
+    off = [np.array([*np.subtract(there.xy, now.xy), 0.0]) for there in behind]
+    best = behind[int(np.argmax([_points_with_room(obstacles, grip + o, far) for o in off]))]
+    if best is not now:
+        yield [dataclasses.replace(shift(best, keeps=world.index(name)), limit=BACK_LIMIT, after="")]
+
+
+def _points_with_room(obstacles: Obstacles, grip: Vector, far: float) -> int:
+    """How many points have room within `far` (m) of the upright line from above a hand's grasp point to the floor."""
+    level, heights = np.arange(-far, far + SPACING / 2, SPACING), np.arange(SPACING, grip[2] + far, SPACING)
+    x, y, z = np.stack(np.meshgrid(level, level, heights), axis=-1).reshape(-1, 3).T
+    around = np.column_stack([x + grip[0], y + grip[1], z])[np.hypot(x, y) <= far]
+    return int(np.sum(obstacles.distance(around) > HELD_MARGIN))
+
+
+def _drop(world: PlannedWorld, name: str, hand: int) -> float:
+    """m that what a hand holds would fall if it were lowered straight and let go."""
+    down = lowered(world, name, hand)
+    end = world.grip(hand) if not down or down[-1].pos is None else np.array(down[-1].pos)
+    return float(world.vertices(name)[:, 2].min() - (world.grip(hand) - end)[2])
 
 
 def _turned(world: PlannedWorld, hand: int, keeps: int, point: Vector, rotation: Rotation) -> Phase:
