@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import os
 import pathlib
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -24,6 +25,8 @@ from ig2mj.tasks.own_goal import split_goal_name
 
 STRIP_SIZE, STRIP_FRAMES = (240, 180), 5
 """Pixels of an image of a strip, and their number."""
+COLUMNS = 98
+"""Of a line of a goal on a page."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -164,7 +167,7 @@ def _section(file: pathlib.Path, image: pathlib.Path, folder: pathlib.Path) -> s
         task, home = str(recording.header.get("task", "")), str(recording.header.get("scene", ""))
     own = split_goal_name(task)
     title = "A goal in a home" if own else task.removeprefix("activity/").replace("_", " ").capitalize()
-    goal = f"`{own[1]}`\n\n" if own else ""
+    goal = f"`{textwrap.fill(own[1], COLUMNS)}`\n\n" if own else ""
     about = f"Home {home}, {len(plan.steps)} primitives, {plan.seconds:.0f} s of simulated time."
     return f"## {title}\n\n{about}\n\n{goal}![{title}]({os.path.relpath(image, folder)})\n"
 
