@@ -7,6 +7,7 @@ import pytest
 from ig2mj.cli import call
 
 
+@pytest.mark.slow
 def test_list_names_all_100_and_the_homes_that_fit(capsys):
     assert call(["activity", "list", "--json"]) == 0
     rows = {row["activity"]: row for row in json.loads(capsys.readouterr().out)}

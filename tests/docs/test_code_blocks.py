@@ -86,6 +86,7 @@ LONG = {
     "README",
     "planning",
     "homes",
+    "randomization",
 }
 """Pages whose blocks take ten seconds or more together: run by `make test-slow`."""
 

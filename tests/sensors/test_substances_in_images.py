@@ -91,6 +91,7 @@ def test_more_spots_than_slots_fill_all_slots():
     assert len(np.unique(np.asarray(slots.pos)[0, -30:], axis=0)) == 30
 
 
+@pytest.mark.slow
 def test_a_stream_ends_in_the_glass():
     view = HOME.view(quat={"jug": tilted(110)})
     slots = fill_slots(MODEL, _holding(MODEL, HOME, jug=1.0), view, 4)
