@@ -166,7 +166,8 @@ def _section(file: pathlib.Path, image: pathlib.Path, folder: pathlib.Path) -> s
         plan = write_video(recording, image)
         task, home = str(recording.header.get("task", "")), str(recording.header.get("scene", ""))
     own = split_goal_name(task)
-    title = "A goal in a home" if own else task.removeprefix("activity/").replace("_", " ").capitalize()
+    words = task.removeprefix("activity/").replace("_", " ")
+    title = "A goal in a home" if own else f"{words[:1].upper()}{words[1:]}"
     goal = f"`{textwrap.fill(own[1], COLUMNS)}`\n\n" if own else ""
     about = f"Home {home}, {len(plan.steps)} primitives, {plan.seconds:.0f} s of simulated time."
     return f"## {title}\n\n{about}\n\n{goal}![{title}]({os.path.relpath(image, folder)})\n"
