@@ -233,9 +233,9 @@ def page(kept: dict[str, list[Row]], requests: Sequence[Row] = (), comparisons: 
         "",
         "## Activities",
         "",
-        "Solved starts of all, and mean q. *steps*: of the first plan, median. *simulated*: seconds of an episode in",
-        "physics, median. *failures*: primitives that failed most often on the highest rung of the humanoid, with the",
-        "reason and how often, or why episodes ended.",
+        "Solved starts of all, and mean q. *steps*: of the humanoid's first plan, median. *simulated*: seconds of its",
+        "episodes in physics, median. *failures*: primitives of the humanoid that failed most often on the highest",
+        "rung, with the reason and how often, or why episodes ended.",
         "",
         *_activities(kept),
         "",
@@ -321,8 +321,8 @@ def _activities(kept: dict[str, list[Row]]) -> list[str]:
     for name in names:
         lines = [by_rung[rung].get(name) for rung in kept]
         there = [line for line in lines if line is not None]
-        highest = next((by_rung[rung][name] for rung in reversed(RUNGS) if name in by_rung.get(rung, {})), there[-1])
-        planned = [n for line in there for n in line["planned"] if n]
+        own = [by_rung[rung][name] for rung in RUNGS if name in by_rung.get(rung, {})]
+        planned = [n for line in own for n in line["planned"] if n]
         cells = [name, next((x["home"] for x in there if x["home"]), "-")]
         cells.append(f"{statistics.median(planned):g}" if planned else "-")
         for line in lines:
@@ -332,7 +332,7 @@ def _activities(kept: dict[str, list[Row]]) -> list[str]:
                 cells += [f"{sum(line['success'])} of {len(line['success'])}", f"{statistics.mean(line['q']):.2f}"]
         physics = by_rung.get("physics", {}).get(name)
         times = [t for t in physics["time"] if t] if physics else []
-        cells += [f"{statistics.median(times):.0f}" if times else "-", _failures(highest)]
+        cells += [f"{statistics.median(times):.0f}" if times else "-", _failures((own or there)[-1])]
         rows.append(cells)
     return table(head, rows)
 

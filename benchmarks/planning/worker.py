@@ -163,8 +163,10 @@ def episodes(
 
 
 def recording_of(args: argparse.Namespace, numbers: Sequence[int]) -> pathlib.Path | None:
-    """File of a recording of starts; None: they are not recorded."""
-    return args.record and args.record / f"{args.activity}_{numbers[0]}.h5"
+    """File of a recording of starts, named by the activity, and by the first of them where that is not 0; None: they
+    are not recorded."""
+    first = f"_{numbers[0]}" if numbers[0] else ""
+    return args.record and args.record / f"{args.activity}{first}.h5"
 
 
 if __name__ == "__main__":

@@ -41,6 +41,7 @@ def test_a_turn_about_an_axis_keeps_it_and_is_that_about_the_vertical(angle):
     axis = np.array([1.0, -2.0, 2.0]) / 3.0
     turn = host_rotations.turn_about(axis, angle)
     np.testing.assert_allclose(turn @ axis, axis, atol=1e-12)
+    np.testing.assert_allclose(host_rotations.turn_about(4.0 * axis, angle), turn, atol=1e-12)
     np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(np.trace(turn), 1.0 + 2.0 * np.cos(angle), atol=1e-12)
     upright = host_rotations.turn_about(np.array([0.0, 0.0, 1.0]), angle)

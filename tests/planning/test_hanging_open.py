@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from ig2mj.geometry.host_rotations import turn_about
 from ig2mj.planning import hanging_open
 from ig2mj.planning.clearance import Obstacles
 from ig2mj.planning.hanging_open import sinks
-from ig2mj.planning.joints import OpenableJoint, about
+from ig2mj.planning.joints import OpenableJoint
 from ig2mj.planning.phases import Phase
 from ig2mj.planning.world import PlannedWorld
 
@@ -27,7 +28,7 @@ def _flap(share: float) -> OpenableJoint:
         now=now,
         closed=0.0,
         open=2.2,
-        vertices=PLATE @ about(UP_AND_BACK, now).T,
+        vertices=PLATE @ turn_about(UP_AND_BACK, now).T,
         grips=(),
     )
 
@@ -43,7 +44,7 @@ def test_a_flap_that_is_past_upright_falls_open_when_its_box_stands():
 @pytest.mark.parametrize(("turned", "expected"), [(0.5, 0.0), (0.75, 0.648943), (1.0, np.cos(1.65))])
 def test_it_sinks_with_the_box_on_the_side_of_the_hinge_but_not_to_its_end_with_the_box_head_down(turned, expected):
     """Turned by so many half turns over to the side of the hinge, the flap has this share of the torque at least."""
-    assert sinks(_flap(0.0), about(UP_AND_BACK, turned * np.pi)) == pytest.approx(expected, abs=1e-6)
+    assert sinks(_flap(0.0), turn_about(UP_AND_BACK, turned * np.pi)) == pytest.approx(expected, abs=1e-6)
 
 
 class _Keyboard(Obstacles):

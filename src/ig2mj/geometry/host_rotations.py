@@ -108,9 +108,9 @@ def about_vertical(angle: float) -> Float[np.ndarray, "3 3"]:
 
 
 def turn_about(axis: Float[np.ndarray, "3"], angle: float) -> Float[np.ndarray, "3 3"]:
-    """Rotation matrix about a unit vector by an angle in rad."""
+    """Rotation matrix about an axis of any length by an angle in rad."""
     c, s = np.cos(angle), np.sin(angle)
-    x, y, z = axis
+    x, y, z = axis / np.linalg.norm(axis)
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + s * k + (1 - c) * (k @ k)
 

@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from ig2mj.geometry.host_rotations import about_vertical
 from ig2mj.planning.clearance import straight
-from ig2mj.planning.driving import shift
+from ig2mj.planning.driving import FAR_BACK_STEPS, shift
 from ig2mj.planning.moves import TOUCHES, Program, ahead, as_close, hand_path, quaternion, travel, vector3, way_home
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.phases import Phase
@@ -22,9 +22,6 @@ from ig2mj.planning.world import HELD_MARGIN, PlannedWorld, Stance, Vector
 
 FARTHEST, STEP = 1.2, 0.15
 """m that the base goes back at most, and between the places at which the hand may have a way."""
-
-BACK_LIMIT = 100
-"""Agent steps that a base on wheels has to go back."""
 
 ASIDE = (0.0, np.pi / 4, -np.pi / 4, np.pi / 2, -np.pi / 2)
 """rad from straight back in which the base goes."""
@@ -56,8 +53,8 @@ def led_out(
         if there is None:
             return None
         level = vector3(about_vertical(-world.stance.yaw) @ (grip - world.from_body(np.zeros(3))))
-        goes = dataclasses.replace(shift(there, carries.keeps), hand=hand, pos=level, in_body=True)
-        if reason := (yield [dataclasses.replace(goes, limit=BACK_LIMIT, after="")]):
+        goes = shift(there, carries.keeps, within=FAR_BACK_STEPS)
+        if reason := (yield [dataclasses.replace(goes, hand=hand, pos=level, in_body=True)]):
             return reason
         program = _around(world, name, hand, carries) or [carries]
     return (yield program)

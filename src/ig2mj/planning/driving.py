@@ -31,8 +31,8 @@ NEAR = 1.0
 BACKS_OFF, RUN_UP = 0.3, 0.6
 """m that a base goes straight back where something has stopped it; on wheels, to take an edge of a carpet."""
 
-BACK_STEPS = 40
-"""Agent steps that this takes at most."""
+BACK_STEPS, FAR_BACK_STEPS = 40, 100
+"""Agent steps that this takes at most, and going back by a metre with what an arm holds."""
 
 SLIGHT = 0.02
 """m of stretching and stooping that do not count."""
@@ -80,7 +80,7 @@ def go(world: PlannedWorld, stance: Stance) -> Generator[Program, str, str]:
         return reason
     here, yaw = world.base
     x, y = here - (BACKS_OFF if world.body.climbs else RUN_UP) * np.array([np.cos(yaw), np.sin(yaw)])
-    yield [dataclasses.replace(shift(Stance((float(x), float(y)), yaw)), limit=BACK_STEPS, after="")]
+    yield [shift(Stance((float(x), float(y)), yaw), within=BACK_STEPS)]
     return (yield from _go(world, stance))
 
 
@@ -267,7 +267,7 @@ def nearer(
         return False
     x, y = (float(v) for v in here + (FARTHER + STOPS) * front)
     keeps = world.index(held) if held else -1
-    yield [dataclasses.replace(shift(Stance((x, y), yaw), keeps), tolerance=STOPS, limit=BACK_STEPS, after="")]
+    yield [dataclasses.replace(shift(Stance((x, y), yaw), keeps, within=BACK_STEPS), tolerance=STOPS)]
     return True
 
 
@@ -339,6 +339,11 @@ def drive(points: np.ndarray, yaw: float | None, speed: float | None = None) -> 
     return program
 
 
-def shift(stance: Stance, keeps: int = -1) -> Phase:
-    """Goes straight to a stance without turning to its way; `keeps`: `Phase.keeps`."""
-    return Phase(Base.SHIFT, xy=stance.xy, yaw=stance.yaw, keeps=keeps, tolerance=0.025, turn_tolerance=0.06)
+def shift(stance: Stance, keeps: int = -1, within: int | None = None) -> Phase:
+    """Goes straight to a stance without turning to its way.
+
+    Args:
+      keeps: `Phase.keeps`. within: agent steps after which the program goes on in any case; None: it has to get there.
+    """
+    phase = Phase(Base.SHIFT, xy=stance.xy, yaw=stance.yaw, keeps=keeps, tolerance=0.025, turn_tolerance=0.06)
+    return phase if within is None else dataclasses.replace(phase, limit=within, after="")

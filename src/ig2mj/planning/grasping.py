@@ -264,16 +264,16 @@ def _take(
         carries,
     ]  # fmt: skip
     reason = yield takes
-    if world.body.opening is not None and not reason and name in world.held:
+    if not reason and name in world.held:
         ends = [start + lift, *points, world.carried(hand, world.stance)]
-        out = yield from led_out(world, name, hand, ends, carries)
-        turning = [dataclasses.replace(p, quat=None if p.in_body else turned) for p in leaves]
-        reason = (yield turning) if out is None else out
-    elif not reason and name in world.held:
-        carries = carry(world, hand, keeps=index)
-        ends = [start + lift, *points, world.carried(hand, world.stance)]
-        out = None if has_room(world, name, hand, ends) else drawn_out(world, name, hand, carries)
-        reason = yield [*leaves[:-1], carries] if out is None else [*_making_room(world, name, hand), *out]
+        if world.body.opening is not None:
+            led = yield from led_out(world, name, hand, ends, carries)
+            turning = [dataclasses.replace(p, quat=None if p.in_body else turned) for p in leaves]
+            reason = (yield turning) if led is None else led
+        else:
+            carries = carry(world, hand, keeps=index)
+            out = None if has_room(world, name, hand, ends) else drawn_out(world, name, hand, carries)
+            reason = yield [*leaves[:-1], carries] if out is None else [*_making_room(world, name, hand), *out]
     if name in world.held:
         return "", ""
     back = vector3(world.grip(hand) - pose.before * pose.palm)

@@ -11,12 +11,12 @@ from collections.abc import Generator, Iterator, Sequence
 
 import numpy as np
 
-from ig2mj.geometry.host_rotations import about_vertical, turn_onto
+from ig2mj.geometry.host_rotations import about_vertical, turn_about, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.clearance import Obstacles
-from ig2mj.planning.driving import shift
+from ig2mj.planning.driving import FAR_BACK_STEPS, shift
 from ig2mj.planning.grasping import grasp, is_graspable, lowered, release
-from ig2mj.planning.joints import OPEN_TO, OpenableJoint, about
+from ig2mj.planning.joints import OPEN_TO, OpenableJoint
 from ig2mj.planning.moves import TOUCHES, UP, Program, ahead, vector3
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.opening import joints_of
@@ -35,9 +35,9 @@ SINKS = 0.2
 OFFSETS = tuple(itertools.product((0.0, 0.15), (0.0, 0.2, -0.2), (0.0, 0.15, -0.15)))
 """m ahead, to the side and up from where a box is carried at which it is turned."""
 
-BACK, BACK_LIMIT, SPACING = np.arange(0.1, 1.25, 0.1), 100, 0.1
-"""m that the base goes back to where there is room for the turns; agent steps that it has for that; and m between the
-points at which it is looked whether there is room."""
+BACK, SPACING = np.arange(0.1, 1.25, 0.1), 0.1
+"""m that the base goes back to where there is room for the turns, and m between the points at which it is looked
+whether there is room."""
 
 DROP = 0.15
 """m that a box may fall when it is let go: from higher, it falls over."""
@@ -101,7 +101,7 @@ def _where_there_is_room(world: PlannedWorld, name: str, hand: int) -> Generator
     off = [np.array([*np.subtract(there.xy, now.xy), 0.0]) for there in behind]
     best = behind[int(np.argmax([_points_with_room(obstacles, grip + o, far) for o in off]))]
     if best is not now:
-        yield [dataclasses.replace(shift(best, keeps=world.index(name)), limit=BACK_LIMIT, after="")]
+        yield [shift(best, keeps=world.index(name), within=FAR_BACK_STEPS)]
 
 
 def _points_with_room(obstacles: Obstacles, grip: Vector, far: float) -> int:
@@ -170,7 +170,7 @@ def _rotations() -> Iterator[Rotation]:
     for turn in np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS):
         axis = about_vertical(float(turn))[:, 0]
         for tilt in TILTS:
-            yield about(axis, tilt)
+            yield turn_about(axis, tilt)
 
 
 def sinks(flap: OpenableJoint, rotation: Rotation) -> float:

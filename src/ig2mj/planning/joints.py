@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import PhysicsView
+from ig2mj.geometry.host_rotations import turn_about
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.scene.scene import Scene
 
@@ -77,7 +78,7 @@ class OpenableJoint:
         """Points of the link after the joint has moved."""
         if not self.hinge:
             return points + by * self.axis
-        return (points - self.anchor) @ about(self.axis, by).T + self.anchor
+        return (points - self.anchor) @ turn_about(self.axis, by).T + self.anchor
 
     def path(self, grip: FaceGrip, fraction: float) -> list[FaceGrip]:
         """Points and normals of the face where a hand is, from where the link is now to a share of its range."""
@@ -194,10 +195,3 @@ def _side_grips(joint: OpenableJoint, middle: Vector) -> tuple[FaceGrip, ...]:
         at = middle + part * along + share * up
         found += [(at + float(depth.max()) * thin, thin), (at + float(depth.min()) * thin, -thin)]
     return tuple(found)
-
-
-def about(axis: Vector, angle: float) -> Float[np.ndarray, "3 3"]:
-    """Rotation matrix."""
-    x, y, z = axis / np.linalg.norm(axis)
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)

@@ -16,14 +16,14 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 import mujoco
 import numpy as np
 
-from ig2mj.geometry.host_rotations import about_vertical, turn_onto
+from ig2mj.geometry.host_rotations import about_vertical, turn_about, turn_onto
 from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.planning.clearance import straight
 from ig2mj.planning.driving import shift
 from ig2mj.planning.grasping import grasp, is_graspable, release
 from ig2mj.planning.grasps import GraspPose
 from ig2mj.planning.hanging_open import hung_open, sinking_flap
-from ig2mj.planning.joints import OPEN_TO, OpenableJoint, about
+from ig2mj.planning.joints import OPEN_TO, OpenableJoint
 from ig2mj.planning.moves import LET_GO, OPENS, RETREAT, TOUCHES, UP, Primitive, Program, ahead, vector3
 from ig2mj.planning.occupancy import RESOLUTION
 from ig2mj.planning.opening import joints_of, set_open, withdraw
@@ -134,7 +134,7 @@ def falling_flap(world: PlannedWorld, name: str) -> Flap | None:
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, joint.name)
     body, sign = int(model.jnt_bodyid[number]), np.sign(joint.open - joint.closed)
     weight = float(model.body_mass[body]) * float(np.linalg.norm(model.opt.gravity))
-    centre = about(model.jnt_axis[number], -float(model.qpos0[model.jnt_qposadr[number]]) + joint.closed)
+    centre = turn_about(model.jnt_axis[number], -float(model.qpos0[model.jnt_qposadr[number]]) + joint.closed)
     axis, arm = sign * model.jnt_axis[number], centre @ (model.body_ipos[body] - model.jnt_pos[number])
     arm = arm - (arm @ axis) * axis
     friction = float(model.dof_frictionloss[model.jnt_dofadr[number]])
@@ -265,9 +265,9 @@ def _program(
 def turns(upright: Rotation, axis: Vector, turn: float) -> list[Rotation]:
     """Orientations one after another of a container that is turned from upright about a level axis of its own frame,
     then onto its side, and from there up."""
-    over = [upright @ about(axis, (turn - 2 * np.pi) * share) for share in np.linspace(0.0, 1.0, PARTS + 1)]
+    over = [upright @ turn_about(axis, (turn - 2 * np.pi) * share) for share in np.linspace(0.0, 1.0, PARTS + 1)]
     down = over[-1].T @ -UP  # in the container's frame
     side = np.cross(down, axis)
     half = np.pi / 2 * np.array([0.5, 1.0])
-    onto = [over[-1] @ about(side, -angle) for angle in half]
-    return [*over, *onto, *(onto[-1] @ about(np.cross(axis, -UP), -angle) for angle in half)]
+    onto = [over[-1] @ turn_about(side, -angle) for angle in half]
+    return [*over, *onto, *(onto[-1] @ turn_about(np.cross(axis, -UP), -angle) for angle in half)]

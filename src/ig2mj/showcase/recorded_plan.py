@@ -102,18 +102,18 @@ def write_video(
     env, world, last = replayer.env, chosen.world, chosen.frames - 1
     size = size or (STRIP_SIZE if strip else (640, 480))
     if strip:
-        wanted = strip_frames([0, *(min(step.end, last) for step in plan.steps)])
+        shown = strip_frames([0, *(min(step.end, last) for step in plan.steps)])
     else:
-        wanted = list(dict.fromkeys([*range(0, last + 1, max(1, round(speed / rate / env.period))), last]))
+        shown = list(dict.fromkeys([*range(0, last + 1, max(1, round(speed / rate / env.period))), last]))
     video = PlanVideo(file, env, world, speed=speed, rate=rate, size=size, frames=STRIP_FRAMES if strip else 0)
     names, state = env.scene.object_names, None
     try:
-        for k, frame in enumerate(wanted):
+        for k, frame in enumerate(shown):
             state = replayer.at(chosen, frame, state)
             step = plan.at(frame)
             objects = [names.index(n) for n in step.objects if n in names] if step is not None else []
             video.see(state, step.words if step is not None else "", objects, now=True)
-            progress(k + 1, len(wanted), f"{k + 1} of {len(wanted)} images")
+            progress(k + 1, len(shown), f"{k + 1} of {len(shown)} images")
     finally:
         video.close()
     return plan
